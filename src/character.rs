@@ -1,0 +1,271 @@
+//! A character: skeleton, meshes, what binds them, and clips, cross-checked once.
+
+use crate::clip::{Clip, Target};
+use crate::fk::{self, Posed};
+use crate::mesh::Mesh;
+use crate::morph::Morphed;
+use crate::pose::Pose;
+use crate::skeleton::{BoneId, Skeleton};
+use crate::skin::{self, Deformed, Method, Weights};
+use glam::{Affine3A, DVec3};
+
+/// A mesh's place in the character.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct MeshId(pub u32);
+
+/// What drives a mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Binding {
+    /// The mesh is fixed to a bone and given in its frame.
+    Bone(BoneId),
+    /// Linear blend over a skin's bones.
+    Skin {
+        /// Palette: bone and `bone_from_mesh` (the inverse bind matrix), in the order that weights index.
+        palette: Vec<(BoneId, Affine3A)>,
+        /// Influences of every vertex.
+        weights: Weights,
+    },
+}
+
+/// A mesh in the scene; several may share one mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Instance {
+    /// Which mesh.
+    pub mesh: MeshId,
+    /// What drives it.
+    pub binding: Binding,
+    /// Its run in `Pose::weights`: first weight; as long as the mesh has targets.
+    pub first_weight: usize,
+}
+
+/// Everything that is animated, and nothing of how it looks.
+#[derive(Clone, Debug, Default)]
+pub struct Character {
+    skeleton: Skeleton,
+    meshes: Vec<Mesh>,
+    instances: Vec<Instance>,
+    rest_weights: Vec<f32>,
+    clips: Vec<Clip>,
+}
+
+/// Parts that do not belong together.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CharacterError {
+    /// A mesh instance that names something missing.
+    #[error("mesh instance {instance}: {what} {index} does not exist; there are {count}")]
+    Instance {
+        /// Which instance.
+        instance: usize,
+        /// Mesh, bone, palette entry or morph weight.
+        what: &'static str,
+        /// The index asked for.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// Weights for another number of vertices.
+    #[error("mesh instance {instance}: weights for {found} vertices, the mesh has {expected}")]
+    Weights {
+        /// Which instance.
+        instance: usize,
+        /// Vertices that the weights cover.
+        found: usize,
+        /// Vertices of the mesh.
+        expected: usize,
+    },
+    /// A track that moves something missing, or has the wrong width.
+    #[error("clip {clip} `{name}`, track {track}: {why}")]
+    Track {
+        /// Which clip.
+        clip: usize,
+        /// Its name.
+        name: String,
+        /// Which track.
+        track: usize,
+        /// What is wrong.
+        why: String,
+    },
+}
+
+impl Character {
+    /// Put the parts together and check that every reference between them holds.
+    ///
+    /// `rest_weights` are the morph weights at rest, one run an instance as `first_weight` says.
+    ///
+    /// # Errors
+    /// [`CharacterError`] names the first reference that does not hold.
+    pub fn new(
+        skeleton: Skeleton,
+        meshes: Vec<Mesh>,
+        instances: Vec<Instance>,
+        rest_weights: Vec<f32>,
+        clips: Vec<Clip>,
+    ) -> Result<Self, CharacterError> {
+        let c = Self { skeleton, meshes, instances, rest_weights, clips };
+        for i in 0..c.instances.len() {
+            c.check_instance(i)?;
+        }
+        for (i, clip) in c.clips.iter().enumerate() {
+            c.check_clip(i, clip)?;
+        }
+        Ok(c)
+    }
+
+    fn check_instance(&self, instance: usize) -> Result<(), CharacterError> {
+        let inst = &self.instances[instance];
+        let within = |what, index: usize, count: usize| {
+            if index < count {
+                return Ok(());
+            }
+            Err(CharacterError::Instance { instance, what, index, count })
+        };
+        within("mesh", inst.mesh.0 as usize, self.meshes.len())?;
+        let mesh = &self.meshes[inst.mesh.0 as usize];
+        within("morph weight", inst.first_weight + mesh.targets.len(), self.rest_weights.len() + 1)?;
+        match &inst.binding {
+            Binding::Bone(b) => within("bone", b.index(), self.skeleton.len()),
+            Binding::Skin { palette, weights } => {
+                for (b, _) in palette {
+                    within("bone", b.index(), self.skeleton.len())?;
+                }
+                let (found, expected) = (weights.vertex_count(), mesh.positions.len());
+                if found != expected {
+                    return Err(CharacterError::Weights { instance, found, expected });
+                }
+                let top = (0..found).flat_map(|v| weights.of(v)).map(|(b, _)| b).max().unwrap_or(0);
+                within("palette entry", top, palette.len().max(usize::from(found == 0)))
+            }
+        }
+    }
+
+    fn check_clip(&self, clip: usize, of: &Clip) -> Result<(), CharacterError> {
+        for (track, t) in of.tracks.iter().enumerate() {
+            let width = t.curve.width();
+            let (ok, why) = match t.target {
+                Target::Weights { first } => (
+                    first + width <= self.rest_weights.len(),
+                    format!("morph weights {first}…{} of {}", first + width, self.rest_weights.len()),
+                ),
+                Target::Xzx(b) | Target::Translation(b) | Target::Scale(b) => (
+                    b.index() < self.skeleton.len() && width == 3,
+                    format!("bone {} of {}, width {width} where 3 is needed", b.0, self.skeleton.len()),
+                ),
+                Target::Rotation(b) => (
+                    b.index() < self.skeleton.len() && width == 4,
+                    format!("bone {} of {}, width {width} where 4 is needed", b.0, self.skeleton.len()),
+                ),
+            };
+            if !ok {
+                return Err(CharacterError::Track { clip, name: of.name.clone(), track, why });
+            }
+        }
+        Ok(())
+    }
+
+    /// The tree of bones.
+    pub fn skeleton(&self) -> &Skeleton {
+        &self.skeleton
+    }
+
+    /// All meshes.
+    pub fn meshes(&self) -> &[Mesh] {
+        &self.meshes
+    }
+
+    /// The mesh of an instance.
+    pub fn mesh(&self, instance: &Instance) -> &Mesh {
+        &self.meshes[instance.mesh.0 as usize]
+    }
+
+    /// What is drawn: meshes and their bindings.
+    pub fn instances(&self) -> &[Instance] {
+        &self.instances
+    }
+
+    /// Animations.
+    pub fn clips(&self) -> &[Clip] {
+        &self.clips
+    }
+
+    /// The same character with other clips.
+    ///
+    /// # Errors
+    /// [`CharacterError::Track`] if a clip does not fit.
+    pub fn with_clips(mut self, clips: Vec<Clip>) -> Result<Self, CharacterError> {
+        for (i, clip) in clips.iter().enumerate() {
+            self.check_clip(i, clip)?;
+        }
+        self.clips = clips;
+        Ok(self)
+    }
+
+    /// The pose that no clip touches.
+    pub fn rest_pose(&self) -> Pose {
+        Pose { weights: self.rest_weights.clone(), ..Pose::rest(&self.skeleton) }
+    }
+
+    /// The pose of clip `clip` (rest for `None`) at `t` seconds; a time outside holds the ends.
+    ///
+    /// # Panics
+    /// If there is no such clip.
+    pub fn pose(&self, clip: Option<usize>, t: f64) -> Pose {
+        let mut pose = self.rest_pose();
+        if let Some(c) = clip {
+            self.clips[c].sample(&self.skeleton, t, &mut pose);
+        }
+        pose
+    }
+
+    /// Bones of a pose in the world.
+    pub fn posed(&self, pose: &Pose) -> Posed {
+        let mut posed = Posed::default();
+        fk::forward(&self.skeleton, pose, &mut posed);
+        posed
+    }
+
+    /// A centre to deform around: near what is drawn, so that f32 suffices (see [`Posed::near`]).
+    pub fn center(&self, posed: &Posed) -> DVec3 {
+        let first = self.instances.first().and_then(|i| match &i.binding {
+            Binding::Bone(b) => Some(*b),
+            Binding::Skin { palette, .. } => palette.first().map(|(b, _)| *b),
+        });
+        first.or_else(|| self.skeleton.ids().next()).map_or(DVec3::ZERO, |b| posed.origin(b))
+    }
+
+    /// Deform one instance: positions relative to `center`, along the world's axes.
+    ///
+    /// # Panics
+    /// If `instance`, `pose` or `posed` are not of this character.
+    pub fn deform(
+        &self,
+        instance: usize,
+        pose: &Pose,
+        posed: &Posed,
+        center: DVec3,
+        scratch: &mut Scratch,
+        out: &mut Deformed,
+    ) {
+        let inst = &self.instances[instance];
+        let mesh = self.mesh(inst);
+        let weights = &pose.weights[inst.first_weight..][..mesh.targets.len()];
+        let rest = scratch.morphed.apply(mesh, weights);
+        scratch.palette.clear();
+        match &inst.binding {
+            Binding::Bone(b) => {
+                scratch.palette.push(posed.near(*b, center));
+                skin::deform(Method::Rigid(0), rest, &scratch.palette, out);
+            }
+            Binding::Skin { palette, weights } => {
+                scratch.palette.extend(palette.iter().map(|(b, m)| posed.near(*b, center) * *m));
+                skin::deform(Method::Linear(weights), rest, &scratch.palette, out);
+            }
+        }
+    }
+}
+
+/// Buffers that [`Character::deform`] uses again.
+#[derive(Clone, Debug, Default)]
+pub struct Scratch {
+    morphed: Morphed,
+    palette: Vec<Affine3A>,
+}

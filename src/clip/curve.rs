@@ -1,0 +1,277 @@
+//! One curve: times, values of some width, and how to get from key to key.
+
+use super::quat;
+use crate::math::rotation;
+use crate::math::spline::{Tangents, hermite, tangent};
+use crate::time::Range;
+use glam::Quat;
+
+/// How values run between keys.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interpolation {
+    /// The earlier key (glTF STEP).
+    Hold,
+    /// Straight; rotations on the arc (glTF LINEAR).
+    Linear,
+    /// Cubic through the keys, slopes by the rule.
+    CatmullRom(Tangents),
+    /// Cubic with stored slopes: each key holds in-slope, value, out-slope (glTF CUBICSPLINE).
+    Hermite,
+}
+
+/// `K` keys of `width` numbers each.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Curve {
+    times: Vec<f64>,
+    values: Vec<f32>,
+    width: usize,
+    interpolation: Interpolation,
+}
+
+/// Why keys make no curve.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CurveError {
+    /// Times and values do not fit together.
+    #[error("{times} key times need {expected} numbers of width {width}, found {found}")]
+    Count {
+        /// Number of keys.
+        times: usize,
+        /// Numbers a key.
+        width: usize,
+        /// Numbers that the keys need.
+        expected: usize,
+        /// Numbers that there are.
+        found: usize,
+    },
+    /// A curve needs a key.
+    #[error("there are no keys")]
+    Empty,
+    /// NaN or infinity.
+    #[error("key {key}: its {what} is not finite")]
+    NotFinite {
+        /// Which key.
+        key: usize,
+        /// Time or value.
+        what: &'static str,
+    },
+    /// Times that run backwards.
+    #[error("key {key}: its time {time} s is before the key ahead of it at {previous} s")]
+    Unsorted {
+        /// Which key.
+        key: usize,
+        /// Its time, seconds.
+        time: f64,
+        /// The time before it, seconds.
+        previous: f64,
+    },
+}
+
+impl Curve {
+    /// Check keys and freeze them. `values` holds `width` numbers a key (three times that for
+    /// [`Interpolation::Hermite`]: in-slope, value, out-slope). Of keys at one time the last wins.
+    ///
+    /// ```
+    /// use sinew::clip::{Curve, Interpolation};
+    /// let c = Curve::new(vec![0.0, 2.0], vec![1.0, 5.0], 1, Interpolation::Linear).unwrap();
+    /// let mut v = [0.0];
+    /// c.sample(0.5, &mut v);
+    /// assert_eq!(v, [2.0]);
+    /// ```
+    ///
+    /// # Errors
+    /// [`CurveError`]: no keys, counts that do not fit, unsorted times, numbers that are not finite.
+    pub fn new(
+        times: Vec<f64>,
+        values: Vec<f32>,
+        width: usize,
+        interpolation: Interpolation,
+    ) -> Result<Self, CurveError> {
+        if times.is_empty() {
+            return Err(CurveError::Empty);
+        }
+        let each = if interpolation == Interpolation::Hermite { 3 * width } else { width };
+        let expected = times.len().saturating_mul(each);
+        if width == 0 || values.len() != expected {
+            return Err(CurveError::Count { times: times.len(), width, expected, found: values.len() });
+        }
+        if let Some(key) = times.iter().position(|t| !t.is_finite()) {
+            return Err(CurveError::NotFinite { key, what: "time" });
+        }
+        if let Some(at) = values.iter().position(|v| !v.is_finite()) {
+            return Err(CurveError::NotFinite { key: at / each, what: "value" });
+        }
+        if let Some(k) = (1..times.len()).find(|&k| times[k] < times[k - 1]) {
+            return Err(CurveError::Unsorted { key: k, time: times[k], previous: times[k - 1] });
+        }
+        Ok(Self { times, values, width, interpolation })
+    }
+
+    /// Key times in seconds, ascending; never empty.
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// The stored numbers, key by key.
+    pub fn values(&self) -> &[f32] {
+        &self.values
+    }
+
+    /// Numbers a key.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// How values run between keys.
+    pub fn interpolation(&self) -> Interpolation {
+        self.interpolation
+    }
+
+    /// First and last key time.
+    pub fn range(&self) -> Option<Range> {
+        Some(Range { start: *self.times.first()?, end: *self.times.last()? })
+    }
+
+    /// The value at key `k`.
+    pub fn value(&self, k: usize) -> &[f32] {
+        let w = self.width;
+        match self.interpolation {
+            Interpolation::Hermite => &self.values[3 * w * k + w..3 * w * k + 2 * w],
+            _ => &self.values[w * k..w * k + w],
+        }
+    }
+
+    /// The curve at `t`, component by component, into `out` (`width` numbers). Outside the keys its ends hold.
+    pub fn sample(&self, t: f64, out: &mut [f32]) {
+        match self.locate(t) {
+            Place::Key(k) => out.copy_from_slice(self.value(k)),
+            Place::Between(k, u) => self.between(k, u, out),
+        }
+    }
+
+    /// The curve at `t` as a unit quaternion (width 4): on the arc where it is linear, else by component and normalised
+    /// (glTF 2.0, appendix C).
+    pub fn sample_rotation(&self, t: f64) -> Quat {
+        match (self.locate(t), self.interpolation) {
+            (Place::Key(k), _) => rotation::unit(quat(self.value(k))),
+            (Place::Between(k, u), Interpolation::Linear) => rotation::slerp(
+                rotation::unit(quat(self.value(k))),
+                rotation::unit(quat(self.value(k + 1))),
+                u as f32,
+            ),
+            (Place::Between(k, u), _) => {
+                let mut v = [0.0; 4];
+                self.between(k, u, &mut v);
+                rotation::unit(quat(&v))
+            }
+        }
+    }
+
+    fn locate(&self, t: f64) -> Place {
+        // The last key at or before t: of keys at one time the last wins.
+        let after = self.times.partition_point(|&k| k <= t);
+        if after == 0 {
+            return Place::Key(self.times.partition_point(|&k| k <= self.times[0]) - 1);
+        }
+        let k = after - 1;
+        if after == self.times.len() || self.times[k] == t || self.interpolation == Interpolation::Hold {
+            return Place::Key(k);
+        }
+        Place::Between(k, (t - self.times[k]) / (self.times[k + 1] - self.times[k]))
+    }
+
+    fn between(&self, k: usize, u: f64, out: &mut [f32]) {
+        let w = self.width;
+        let h = self.times[k + 1] - self.times[k];
+        let (a, b) = (self.value(k), self.value(k + 1));
+        for c in 0..w {
+            let (p0, p1) = (a[c] as f64, b[c] as f64);
+            out[c] = match self.interpolation {
+                Interpolation::Hold => a[c],
+                Interpolation::Linear => (p0 + (p1 - p0) * u) as f32,
+                Interpolation::Hermite => {
+                    let out_slope = self.values[3 * w * k + 2 * w + c] as f64;
+                    let in_slope = self.values[3 * w * (k + 1) + c] as f64;
+                    hermite(p0, out_slope, p1, in_slope, h, u) as f32
+                }
+                Interpolation::CatmullRom(rule) => {
+                    let (m0, m1) = (self.slope(rule, k, c), self.slope(rule, k + 1, c));
+                    hermite(p0, m0, p1, m1, h, u) as f32
+                }
+            };
+        }
+    }
+
+    /// Slope of component `c` at key `k`; a neighbour at the same time counts as missing.
+    fn slope(&self, rule: Tangents, k: usize, c: usize) -> f64 {
+        let at = |i: usize| (self.times[i], self.value(i)[c] as f64);
+        let distinct = |i: usize| self.times.get(i).is_some_and(|&t| t != self.times[k]);
+        let prev = k.checked_sub(1).filter(|&i| distinct(i)).map(at);
+        let next = Some(k + 1).filter(|&i| distinct(i)).map(at);
+        tangent(rule, prev, at(k), next)
+    }
+}
+
+enum Place {
+    Key(usize),
+    Between(usize, f64),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(c: &Curve, t: f64) -> f32 {
+        let mut v = [0.0];
+        c.sample(t, &mut v);
+        v[0]
+    }
+
+    #[test]
+    fn keys_at_one_time_hold_and_the_last_wins() {
+        for i in [
+            Interpolation::Hold,
+            Interpolation::Linear,
+            Interpolation::CatmullRom(Tangents::Notes),
+            Interpolation::CatmullRom(Tangents::Monotone),
+        ] {
+            let c = Curve::new(vec![0.0, 1.0, 1.0, 2.0], vec![0.0, 1.0, 5.0, 6.0], 1, i).unwrap();
+            assert_eq!(at(&c, 1.0), 5.0);
+            assert!(at(&c, 0.999_999) <= 1.01 && at(&c, 1.000_001).is_finite());
+            let c = Curve::new(vec![1.0, 1.0], vec![3.0, 4.0], 1, i).unwrap();
+            assert_eq!((at(&c, 0.0), at(&c, 1.0), at(&c, 9.0)), (4.0, 4.0, 4.0));
+        }
+    }
+
+    #[test]
+    fn bad_keys_are_named() {
+        let new =
+            |t: Vec<f64>, v: Vec<f32>| Curve::new(t, v, 1, Interpolation::Linear).unwrap_err().to_string();
+        assert_eq!(new(vec![], vec![]), "there are no keys");
+        assert_eq!(new(vec![0.0, 1.0], vec![1.0]), "2 key times need 2 numbers of width 1, found 1");
+        assert_eq!(new(vec![0.0, f64::NAN], vec![1.0, 2.0]), "key 1: its time is not finite");
+        assert_eq!(new(vec![0.0, 1.0], vec![1.0, f32::INFINITY]), "key 1: its value is not finite");
+        assert!(new(vec![1.0, 0.5], vec![1.0, 2.0]).contains("key 1: its time 0.5 s is before"));
+    }
+
+    #[test]
+    fn reconstruction_errors_follow_their_laws() {
+        // Max error over amplitude for sin(ωt), key spacing h: linear (ωh)²/8, Catmull-Rom 0.0160(ωh)³, fitted Hermite (ωh)⁴/384.
+        let (h, n) = (0.1, 200);
+        let t: Vec<f64> = (0..n).map(|k| k as f64 * h).collect();
+        let v: Vec<f32> = t.iter().map(|t| t.sin() as f32).collect();
+        let triple: Vec<f32> =
+            t.iter().flat_map(|t| [t.cos() as f32, t.sin() as f32, t.cos() as f32]).collect();
+        let worst = |c: Curve| {
+            (100..1800)
+                .map(|k| k as f64 * 0.01)
+                .map(|t| (at(&c, t) as f64 - t.sin()).abs())
+                .fold(0.0, f64::max)
+        };
+        let lin = worst(Curve::new(t.clone(), v.clone(), 1, Interpolation::Linear).unwrap());
+        let cat = worst(Curve::new(t.clone(), v, 1, Interpolation::CatmullRom(Tangents::Notes)).unwrap());
+        let her = worst(Curve::new(t, triple, 1, Interpolation::Hermite).unwrap());
+        assert!((lin / (h * h / 8.0) - 1.0).abs() < 0.05, "{lin}");
+        assert!((cat / (0.0160 * h * h * h) - 1.0).abs() < 0.1, "{cat}");
+        assert!(her < 1.1 * h.powi(4) / 384.0 + 1.5e-7, "{her}");
+    }
+}

@@ -1,0 +1,77 @@
+//! Linear light and sRGB (IEC 61966-2-1).
+
+use std::sync::LazyLock;
+
+/// Linear light from an sRGB value, both 0…1.
+pub fn linear_from_srgb(c: f32) -> f32 {
+    if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+}
+
+/// The sRGB value of linear light, both 0…1.
+pub fn srgb_from_linear(c: f32) -> f32 {
+    if c <= 0.0031308 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// Linear light of each 8-bit sRGB value.
+pub static LINEAR_OF_SRGB8: LazyLock<[f32; 256]> =
+    LazyLock::new(|| std::array::from_fn(|i| linear_from_srgb(i as f32 / 255.0)));
+
+/// Linear light above which the 8-bit sRGB code is at least `i + 1`: where `encode` rounds up.
+static THRESHOLDS: LazyLock<[f32; 255]> =
+    LazyLock::new(|| std::array::from_fn(|i| linear_from_srgb((i as f32 + 0.5) / 255.0)));
+
+/// A first guess of the code for 1024 equal steps of √(linear light); it is never above the code.
+static GUESS: LazyLock<[u8; 1025]> = LazyLock::new(|| {
+    std::array::from_fn(|i| {
+        let c = (i as f32 / 1024.0).powi(2);
+        THRESHOLDS.partition_point(|&t| t <= c) as u8
+    })
+});
+
+/// The nearest 8-bit sRGB code of linear light; NaN gives 0, values outside 0…1 are clipped.
+///
+/// Exact: the code whose decoded sRGB value is nearest in sRGB, by comparing with 255 thresholds.
+///
+/// ```
+/// use sinew::image::color::{LINEAR_OF_SRGB8, srgb8};
+/// assert!((0..256).all(|i| srgb8(LINEAR_OF_SRGB8[i]) == i as u8));
+/// ```
+#[inline]
+pub fn srgb8(c: f32) -> u8 {
+    let c = if c > 0.0 { c.min(1.0) } else { 0.0 };
+    let mut code = GUESS[(c.sqrt() * 1024.0) as usize] as usize;
+    while code < 255 && THRESHOLDS[code] <= c {
+        code += 1;
+    }
+    code as u8
+}
+
+/// One linear, premultiplied pixel as 8-bit sRGB with straight alpha.
+#[inline]
+pub fn encode_srgb8(p: [f32; 4]) -> [u8; 4] {
+    let a = p[3];
+    if a >= 1.0 {
+        return [srgb8(p[0]), srgb8(p[1]), srgb8(p[2]), 255];
+    }
+    let alpha = (a.max(0.0) * 255.0 + 0.5) as u8;
+    if alpha == 0 {
+        return [0; 4];
+    }
+    let k = 1.0 / a;
+    [srgb8(p[0] * k), srgb8(p[1] * k), srgb8(p[2] * k), alpha]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_rounds_like_the_formula() {
+        for i in 0..=200_000 {
+            let c = i as f32 / 200_000.0;
+            let want = srgb_from_linear(c) * 255.0;
+            assert!((srgb8(c) as f32 - want).abs() <= 0.5 + 1e-3, "{c}: {} {want}", srgb8(c));
+        }
+        assert_eq!((srgb8(f32::NAN), srgb8(-1.0), srgb8(f32::INFINITY)), (0, 0, 255));
+    }
+}

@@ -1,0 +1,43 @@
+//! Lamps.
+
+use glam::Vec3;
+
+/// Where light comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LightKind {
+    /// From infinitely far away, travelling along `direction` (unit).
+    Directional {
+        /// The way light travels.
+        direction: Vec3,
+    },
+    /// From a point in all directions, without fall-off (as in the notes §3.1) unless `range` is given.
+    Point {
+        /// Scene space.
+        position: Vec3,
+        /// Inverse-square fall-off with unit intensity at 1 m: `1/d²`, faded out at the range (KHR_lights_punctual);
+        /// `None`: the same at every distance.
+        falloff: Option<f32>,
+    },
+    /// A cone (KHR_lights_punctual spot).
+    Spot {
+        /// Scene space.
+        position: Vec3,
+        /// The axis along which light travels, unit.
+        direction: Vec3,
+        /// As for a point light.
+        falloff: Option<f32>,
+        /// Cosine of the angle where it begins to fade.
+        cos_inner: f32,
+        /// Cosine of the angle where it ends.
+        cos_outer: f32,
+    },
+}
+
+/// A lamp.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Light {
+    /// Where it is.
+    pub kind: LightKind,
+    /// `I`: linear RGB.
+    pub color: Vec3,
+}

@@ -1,0 +1,50 @@
+//! What is drawn: camera, lights, materials, textures and surfaces, as plain data.
+
+mod camera;
+mod light;
+mod material;
+mod texture;
+
+pub use camera::{Camera, CameraError, Projection};
+pub use light::{Light, LightKind};
+pub use material::{AlphaMode, Material, TextureRef};
+pub use texture::{Filter, Texture, TextureError, TextureId, WrapMode};
+
+use crate::mesh::Mesh;
+use glam::{Vec3, Vec4};
+
+/// A surface as it stands now. Lists are as in `MeshData`; positions and directions are in the scene's frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Object<'a> {
+    /// Triangles, texture coordinates and colours.
+    pub mesh: &'a Mesh,
+    /// `V` positions, scene space.
+    pub positions: &'a [Vec3],
+    /// `V` unit normals, or none: then faces are flat.
+    pub normals: &'a [Vec3],
+    /// `V` unit tangents and handedness, or none.
+    pub tangents: &'a [Vec4],
+    /// Index into `Scene::materials`.
+    pub material: usize,
+    /// Triangles wind the other way round (a mirroring transform).
+    pub mirrored: bool,
+}
+
+/// Everything that a renderer reads.
+#[derive(Clone, Debug)]
+pub struct Scene<'a> {
+    /// The eye.
+    pub camera: Camera,
+    /// Light from everywhere: `I_a`, linear RGB.
+    pub ambient: Vec3,
+    /// Lamps.
+    pub lights: Vec<Light>,
+    /// Linear RGBA behind everything, alpha premultiplied.
+    pub background: [f32; 4],
+    /// Surfaces.
+    pub objects: Vec<Object<'a>>,
+    /// What surfaces are made of.
+    pub materials: &'a [Material],
+    /// What materials refer to.
+    pub textures: &'a [Texture],
+}

@@ -1,0 +1,104 @@
+//! Textures: decoded pixels, how they repeat and how they are filtered.
+
+/// A texture's place in the scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct TextureId(pub u32);
+
+/// What lies outside 0…1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum WrapMode {
+    /// The picture again.
+    #[default]
+    Repeat,
+    /// The picture mirrored, every other time.
+    Mirror,
+    /// Its edge.
+    Clamp,
+}
+
+/// How pixels are mixed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Filter {
+    /// The nearest pixel of the nearest level.
+    Nearest,
+    /// Eight pixels of two levels.
+    #[default]
+    Trilinear,
+}
+
+/// Decoded 8-bit RGBA with its mip chain.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Texture {
+    width: u32,
+    height: u32,
+    srgb: bool,
+    wrap: [WrapMode; 2],
+    filter: Filter,
+    levels: Vec<Vec<u8>>,
+}
+
+/// Pixels that make no texture.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("a {width}×{height} texture needs {expected} bytes (4 a pixel, at least one pixel), found {found}")]
+pub struct TextureError {
+    /// Pixels a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `4 · width · height`.
+    pub expected: u64,
+    /// Bytes given.
+    pub found: u64,
+}
+
+impl Texture {
+    /// Build from RGBA bytes, rows from the top. `srgb`: RGB are sRGB codes (alpha never is); mip levels are then averaged
+    /// in linear light.
+    ///
+    /// # Errors
+    /// [`TextureError`] where the bytes do not fit the size.
+    pub fn new(
+        width: u32,
+        height: u32,
+        rgba: Vec<u8>,
+        srgb: bool,
+        wrap: [WrapMode; 2],
+        filter: Filter,
+    ) -> Result<Self, TextureError> {
+        let expected = 4 * width as u64 * height as u64;
+        if expected == 0 || rgba.len() as u64 != expected {
+            return Err(TextureError { width, height, expected, found: rgba.len() as u64 });
+        }
+        Ok(Self { width, height, srgb, wrap, filter, levels: vec![rgba] })
+    }
+
+    /// Pixels a row of the finest level.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Rows of the finest level.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// RGB are sRGB codes.
+    pub fn srgb(&self) -> bool {
+        self.srgb
+    }
+
+    /// What lies outside, along u and v.
+    pub fn wrap(&self) -> [WrapMode; 2] {
+        self.wrap
+    }
+
+    /// How pixels are mixed.
+    pub fn filter(&self) -> Filter {
+        self.filter
+    }
+
+    /// RGBA bytes of a level; 0 is the finest, each next one half as large.
+    pub fn levels(&self) -> &[Vec<u8>] {
+        &self.levels
+    }
+}

@@ -1,0 +1,23 @@
+//! Promises checked on third-party files, found in `SINEW_DATA` or `../shared/data`.
+//!
+//! Without the files every test here is reported as ignored; with `SINEW_DATA` set to a missing folder the run fails.
+
+mod support;
+
+use libtest_mimic::{Arguments, Trial};
+
+fn main() {
+    let data = support::data_dir();
+    let mut trials: Vec<Trial> = Vec::new();
+    for (name, test) in TESTS {
+        let dir = data.clone();
+        let run = move || test(dir.as_deref().expect("ignored without data")).map_err(Into::into);
+        trials.push(Trial::test(*name, run).with_ignored_flag(data.is_none()));
+    }
+    libtest_mimic::run(&Arguments::from_args(), trials).exit();
+}
+
+type Test = fn(&std::path::Path) -> Result<(), String>;
+
+/// Name and body of every test.
+const TESTS: &[(&str, Test)] = &[];
