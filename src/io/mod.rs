@@ -7,6 +7,8 @@ pub mod notes;
 #[cfg(feature = "pictures")]
 pub mod picture;
 #[cfg(feature = "io")]
+pub mod ply;
+#[cfg(feature = "io")]
 pub mod rig_json;
 
 use crate::asset::Asset;
@@ -65,4 +67,86 @@ pub struct Import {
     pub extensions: Vec<String>,
     /// Everything that was dropped or repaired.
     pub warnings: Vec<Warning>,
+}
+
+/// Why a file could not be read.
+#[cfg(feature = "io")]
+#[derive(Debug, thiserror::Error)]
+pub enum ImportError {
+    /// The file cannot be opened.
+    #[error("{source}")]
+    Read {
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// No format that is known.
+    #[error("{0}")]
+    Unknown(String),
+    /// A rig of the notes.
+    #[error(transparent)]
+    Notes(#[from] notes::NotesError),
+}
+
+/// Read any file that the engine knows; the content decides, not the name.
+///
+/// # Errors
+/// [`ImportError`]; the caller knows which file it named, the message says where in it.
+#[cfg(feature = "io")]
+pub fn import(path: &std::path::Path, options: &Options) -> Result<Import, ImportError> {
+    let bytes = std::fs::read(path).map_err(|source| ImportError::Read { source })?;
+    let folder = path.parent().unwrap_or(std::path::Path::new(""));
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    match probe(&bytes) {
+        Format::Notes => Ok(notes::import_bytes(&bytes, folder, options)?),
+        Format::Gltf | Format::Rig => Err(ImportError::Unknown(format!("{name}: not yet"))),
+        Format::Unknown(why) => Err(ImportError::Unknown(why)),
+    }
+}
+
+#[cfg(feature = "io")]
+enum Format {
+    Gltf,
+    Rig,
+    Notes,
+    Unknown(String),
+}
+
+/// Tell formats apart by their first bytes, then by the keys of their JSON object.
+#[cfg(feature = "io")]
+fn probe(bytes: &[u8]) -> Format {
+    use serde::de::IgnoredAny;
+
+    #[derive(serde::Deserialize)]
+    struct Keys {
+        sinew_rig: Option<IgnoredAny>,
+        sinew_poses: Option<IgnoredAny>,
+        asset: Option<IgnoredAny>,
+        bones: Option<IgnoredAny>,
+        model: Option<IgnoredAny>,
+    }
+
+    if bytes.starts_with(b"glTF") {
+        return Format::Gltf;
+    }
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    match serde_json::from_slice::<Keys>(text) {
+        Ok(Keys { sinew_rig: Some(_), .. }) => Format::Rig,
+        Ok(Keys { asset: Some(_), .. }) => Format::Gltf,
+        Ok(Keys { bones: Some(_), model: Some(_), .. }) => Format::Notes,
+        Ok(Keys { sinew_poses: Some(_), .. }) => Format::Unknown(
+            "these are poses without a rig; name the rig, and these with --poses".into(),
+        ),
+        Ok(_) => Format::Unknown(
+            "a JSON file without `asset` (glTF), `sinew_rig` (a rig of ours) or `bones` and `model` (a rig of the notes)"
+                .into(),
+        ),
+        Err(e) if text.first().is_some_and(|&b| b == b'{' || b.is_ascii_whitespace()) => {
+            Format::Unknown(format!("JSON that does not parse: {e}"))
+        }
+        Err(_) if bytes.is_empty() => Format::Unknown("the file is empty".into()),
+        Err(_) => Format::Unknown(format!(
+            "expected glTF (.gltf, .glb) or a rig (.json), found bytes that begin with {:02x?}",
+            &bytes[..bytes.len().min(8)]
+        )),
+    }
 }
