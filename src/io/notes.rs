@@ -183,7 +183,8 @@ fn rest_transforms(bones: &[Bone]) -> Result<Vec<DAffine3>, NotesError> {
         let axes = DMat3::from_cols(col(0), col(1), col(2));
         let off = (axes.transpose() * axes - DMat3::IDENTITY).to_cols_array();
         if !off.iter().all(|x| x.abs() < 1e-4) || axes.determinant() < 0.0 || !col(3).is_finite() {
-            let why = "rest_T is no rotation and translation; its first three columns must be orthonormal".into();
+            let why =
+                "rest_T is no rotation and translation; its first three columns must be orthonormal".into();
             return Err(NotesError::Bone { bone, why });
         }
         Ok(DAffine3 { matrix3: axes, translation: col(3) })
@@ -214,7 +215,15 @@ fn describe(bones: &[Bone], rest_from_bone: &[DAffine3]) -> Result<Vec<BoneDesc>
         let limit = |l: [f64; 3]| Vec3::from_array(l.map(|d| d.to_radians() as f32));
         let limits = b.xzx_min.zip(b.xzx_max).map(|(lo, hi)| Limits { min: limit(lo), max: limit(hi) });
         let length = b.length as f32;
-        Ok(BoneDesc { name: format!("bone {bone}"), parent, rest, fixed: None, length, aim: Quat::IDENTITY, limits })
+        Ok(BoneDesc {
+            name: format!("bone {bone}"),
+            parent,
+            rest,
+            fixed: None,
+            length,
+            aim: Quat::IDENTITY,
+            limits,
+        })
     };
     bones.iter().enumerate().map(one).collect()
 }
@@ -263,7 +272,8 @@ fn bind(
         return Err(wrong(format!("expected {v} rows, one a vertex, found {}", table.rows)));
     }
     if let Some(&b) = driving.iter().find(|&&b| file.bones[b].weight_id as usize >= table.columns) {
-        let why = format!("weight_id {} but the table has {} columns", file.bones[b].weight_id, table.columns);
+        let why =
+            format!("weight_id {} but the table has {} columns", file.bones[b].weight_id, table.columns);
         return Err(NotesError::Bone { bone: b, why });
     }
     let k = driving.len();

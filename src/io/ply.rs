@@ -159,9 +159,11 @@ fn header(bytes: &[u8]) -> Result<(Vec<Element>, &[u8]), PlyError> {
 
 fn property(words: &[&str]) -> Option<Property> {
     match words {
-        ["property", "list", count, kind, name] => {
-            Some(Property { name: name.to_string(), kind: Kind::parse(kind)?, list: Some(Kind::parse(count)?) })
-        }
+        ["property", "list", count, kind, name] => Some(Property {
+            name: name.to_string(),
+            kind: Kind::parse(kind)?,
+            list: Some(Kind::parse(count)?),
+        }),
         ["property", kind, name] => {
             Some(Property { name: name.to_string(), kind: Kind::parse(kind)?, list: None })
         }

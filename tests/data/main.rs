@@ -2,6 +2,7 @@
 //!
 //! Without the files every test here is reported as ignored; with `SINEW_DATA` set to a missing folder the run fails.
 
+mod notes;
 mod support;
 
 use libtest_mimic::{Arguments, Trial};
@@ -20,4 +21,10 @@ fn main() {
 type Test = fn(&std::path::Path) -> Result<(), String>;
 
 /// Name and body of every test.
-const TESTS: &[(&str, Test)] = &[];
+const TESTS: &[(&str, Test)] = &[
+    ("notes::the_robot_arm_is_where_it_should_be", notes::the_robot_arm_is_where_it_should_be),
+    ("notes::closest_segments_rebuild_the_arms_weights", notes::closest_segments_rebuild_the_arms_weights),
+    ("notes::rest_is_the_identity", notes::rest_is_the_identity),
+    ("notes::surfaces_are_counted", notes::surfaces_are_counted),
+    ("notes::cut_rigs_are_refused", notes::cut_rigs_are_refused),
+];
