@@ -28,6 +28,8 @@ pub mod asset;
 
 pub mod render;
 
+pub mod frames;
+
 #[cfg(any(feature = "io", feature = "pictures"))]
 pub mod io;
 

@@ -1,1 +1,5 @@
 //! What the library promises, a module a subject.
+
+mod architecture;
+mod deform;
+mod rng;
