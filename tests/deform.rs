@@ -1,6 +1,6 @@
 //! What every deformer promises, and what skinning and kinematics keep at the extremes.
 
-use glam::{Affine3A, DAffine3, DQuat, DVec3, Mat3A, Quat, Vec3, Vec3A};
+use glam::{Affine3A, DAffine3, DQuat, DVec3, Mat3A, Quat, Vec3, Vec3A, Vec3Swizzles};
 use sinew::fk::{self, Posed};
 use sinew::math::rotation::angle_between;
 use sinew::pose::Pose;
@@ -62,13 +62,14 @@ fn a_rigid_motion_of_the_whole_body_moves_every_vertex_rigidly_under_every_defor
 }
 
 #[test]
-fn identity_palettes_change_nothing_bitwise_and_one_hot_linear_is_rigid_bitwise() {
+fn identity_palettes_leave_positions_bitwise_alone_and_one_hot_linear_is_rigid_bitwise() {
     let (p, n) = tube();
     let hot = one_hot(p.len());
     let out = run(Method::Linear(&hot), &p, &n, &[Affine3A::IDENTITY]);
-    assert_eq!((&out.positions, &out.normals), (&p, &n));
+    assert!(out.positions == p);
+    assert!(out.normals.iter().zip(&n).all(|(a, b)| a.distance(*b) <= 2.0 * f32::EPSILON));
     let m = random_rigid(&mut Rng::new(3));
-    assert_eq!(run(Method::Linear(&hot), &p, &n, &[m]).positions, run(Method::Rigid(0), &p, &n, &[m]).positions);
+    assert!(run(Method::Linear(&hot), &p, &n, &[m]) == run(Method::Rigid(0), &p, &n, &[m]));
 }
 
 #[test]
@@ -212,7 +213,8 @@ fn scales_of_a_millionth_and_a_million_keep_five_digits() {
         for b in skeleton.ids() {
             let (got, want) = (posed.world_from_bone(b), exact[b.index()]);
             let size = want.matrix3.to_cols_array().iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-            let off = (got.matrix3 - want.matrix3).to_cols_array().iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            let off =
+                (got.matrix3 - want.matrix3).to_cols_array().iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             assert!(off <= 1e-5 * size, "{s}: {off} of {size}");
         }
     }
@@ -224,5 +226,3 @@ fn twist_bend_twist_back_is_a_bend_about_y() {
     let r = sinew::math::euler::rotation_from_xzx(theta);
     assert!(angle_between(r, Quat::from_rotation_y(40_f32.to_radians())) < 1e-6);
 }
-
-use glam::Vec3Swizzles;
