@@ -1,0 +1,97 @@
+//! From JSON text to the typed schema. What the schema crate refuses although files have it is mended first.
+
+use super::error::{GltfError, Result};
+use super::warnings::Warnings;
+use ::gltf::json::Root;
+use serde_json::{Map, Value, json};
+
+/// Parse, check the version, mend, and give the JSON its types.
+pub(super) fn root(text: &[u8], warnings: &mut Warnings) -> Result<Root> {
+    let mut value: Value = serde_json::from_slice(trim_padding(text))?;
+    version(&mut value, warnings)?;
+    strip_extras(&mut value);
+    optional_lists(&mut value);
+    texture_sources(&mut value);
+    channels_without_node(&mut value, warnings);
+    Ok(serde_json::from_value(value)?)
+}
+
+/// GLB pads its JSON with spaces; some writers pad with zeros.
+fn trim_padding(text: &[u8]) -> &[u8] {
+    let end = text.iter().rposition(|&b| b != 0).map_or(0, |i| i + 1);
+    &text[..end]
+}
+
+fn version(value: &mut Value, warnings: &mut Warnings) -> Result<()> {
+    let Some(root) = value.as_object_mut() else { return Ok(()) };
+    let asset = root.entry("asset").or_insert_with(|| json!({}));
+    let Some(asset) = asset.as_object_mut() else { return Ok(()) };
+    for (key, place) in [("version", "asset.version"), ("minVersion", "asset.minVersion")] {
+        match asset.get(key).and_then(Value::as_str) {
+            Some(v) if v.split('.').next() != Some("2") => {
+                return Err(GltfError::Version { place, found: v.into() });
+            }
+            Some("2.0") | None => {}
+            Some(v) if key == "minVersion" => {
+                return Err(GltfError::Version { place, found: v.into() });
+            }
+            Some(_) => {}
+        }
+    }
+    if !asset.contains_key("version") {
+        warnings.push("asset", "says no version; read as 2.0");
+        asset.insert("version".into(), json!("2.0"));
+    }
+    Ok(())
+}
+
+/// Extras mean nothing to us, and some of them are not what the schema crate expects.
+fn strip_extras(value: &mut Value) {
+    // An explicit stack: the parser bounds the depth, but a walk needs no recursion.
+    let mut stack = vec![value];
+    while let Some(v) = stack.pop() {
+        match v {
+            Value::Array(list) => stack.extend(list.iter_mut()),
+            Value::Object(map) => {
+                map.remove("extras");
+                stack.extend(map.values_mut());
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Lists that the specification leaves optional.
+fn optional_lists(value: &mut Value) {
+    for scene in objects(value, "scenes") {
+        scene.entry("nodes").or_insert_with(|| json!([]));
+    }
+}
+
+fn texture_sources(value: &mut Value) {
+    for texture in objects(value, "textures") {
+        texture.entry("source").or_insert_with(|| json!(u32::MAX));
+    }
+}
+
+/// Channels without a node move something of an extension's (KHR_animation_pointer); we have nothing there to move.
+fn channels_without_node(value: &mut Value, warnings: &mut Warnings) {
+    for (a, animation) in objects(value, "animations").enumerate() {
+        let Some(channels) = animation.get_mut("channels").and_then(Value::as_array_mut) else { continue };
+        let mut c = 0;
+        channels.retain(|channel| {
+            let kept = channel["target"].get("node").is_some() || channel.get("target").is_none();
+            if !kept {
+                let place = format!("animations[{a}].channels[{c}]");
+                warnings.push(place, "its target names no node; the channel is left out");
+            }
+            c += 1;
+            kept
+        });
+    }
+}
+
+fn objects<'a>(value: &'a mut Value, key: &str) -> impl Iterator<Item = &'a mut Map<String, Value>> {
+    let list = value.get_mut(key).and_then(Value::as_array_mut);
+    list.into_iter().flatten().filter_map(Value::as_object_mut)
+}

@@ -1,0 +1,161 @@
+//! Skins: palettes of joints and inverse bind matrices, and the weights of vertices.
+
+use super::attributes::accessor;
+use super::document::Document;
+use super::error::{GltfError, Result, entry, value};
+use super::nodes::{Nodes, bone};
+use super::warnings::Warnings;
+use crate::character::Binding;
+use crate::mesh::Mesh;
+use crate::skeleton::BoneId;
+use crate::skin::Weights;
+use ::gltf::json::accessor::Type;
+use ::gltf::json::mesh::{Primitive, Semantic};
+use glam::Affine3A;
+use std::collections::BTreeMap;
+
+type Palette = Vec<(BoneId, Affine3A)>;
+
+/// Palettes, each built once.
+#[derive(Default)]
+pub(super) struct Skins(BTreeMap<usize, Palette>);
+
+impl Skins {
+    /// Bind a primitive to a skin; `None` where it has no joints or no weights.
+    pub fn bind(
+        &mut self,
+        doc: &Document,
+        nodes: &Nodes,
+        node: usize,
+        skin: usize,
+        primitive: &Primitive,
+        mesh: &Mesh,
+        place: &str,
+        w: &mut Warnings,
+    ) -> Result<Option<Binding>> {
+        if !self.0.contains_key(&skin) {
+            let place = format!("nodes[{node}].skin");
+            self.0.insert(skin, palette(doc, nodes, skin, &place, w)?);
+        }
+        let palette = &self.0[&skin];
+        let Some((per_vertex, joints, mut weights)) = influences(doc, primitive, place)? else {
+            w.push(place, "has a skin but no joints and weights; it moves with its node");
+            return Ok(None);
+        };
+        let count = mesh.positions.len();
+        if joints.len() != count * per_vertex || weights.len() != joints.len() {
+            let found = format!("{} joints and {} weights", joints.len(), weights.len());
+            return Err(value(place, format!("{per_vertex} joints and weights for {count} vertices"), found));
+        }
+        doc.charge(palette.len() as u64 * 64 + joints.len() as u64 * 6, place)?;
+
+        // Vertices without weight follow their first joint, as in other players.
+        let mut empty = 0;
+        for (w, j) in weights.chunks_exact_mut(per_vertex).zip(joints.chunks_exact(per_vertex)) {
+            if w.iter().all(|&w| w == 0.0) && (j[0] as usize) < palette.len() {
+                empty += 1;
+                w[0] = 1.0;
+            }
+        }
+        let (weights, report) = Weights::new(per_vertex, &joints, &weights, palette.len(), 0)
+            .map_err(|source| GltfError::Weights { place: place.into(), source })?;
+        if empty + report.empty > 0 {
+            let n = empty + report.empty;
+            w.push(place, format!("{n} vertices have no weight; they follow their first joint"));
+        }
+        if report.scaled > 0 {
+            let (n, sum) = (report.scaled, report.worst_sum);
+            w.push(
+                place,
+                format!("weights of {n} vertices do not add up to 1 (off by up to {sum:.3}); scaled"),
+            );
+        }
+        if report.negative > 0 {
+            w.push(place, format!("{} weights are negative; set to 0", report.negative));
+        }
+        Ok(Some(Binding::Skin { palette: palette.clone(), weights }))
+    }
+}
+
+/// Joints with their inverse bind matrices; identities where the skin has none.
+fn palette(doc: &Document, nodes: &Nodes, skin: usize, place: &str, w: &mut Warnings) -> Result<Palette> {
+    let json = entry(&doc.root.skins, skin, "skin", || place.into())?;
+    let at = format!("skins[{skin}]");
+    if json.joints.is_empty() {
+        return Err(value(format!("{at}.joints"), "at least one joint", "none"));
+    }
+    let inverse = match json.inverse_bind_matrices {
+        Some(i) => {
+            let place = format!("{at}.inverseBindMatrices");
+            let m = doc.floats(i.value(), &[Type::Mat4], &place)?;
+            if m.len() < json.joints.len() {
+                let expected = format!("{} matrices, one a joint", json.joints.len());
+                return Err(value(place, expected, m.len().to_string()));
+            }
+            Some((m, place))
+        }
+        None => None,
+    };
+    let mut out = Vec::with_capacity(json.joints.len());
+    for (k, joint) in json.joints.iter().enumerate() {
+        let bone = bone(nodes, joint.value(), || format!("{at}.joints[{k}]"))?;
+        let matrix = match &inverse {
+            Some((m, place)) => affine(&m.values[16 * k..16 * k + 16], &format!("{place}[{k}]"), w)?,
+            None => Affine3A::IDENTITY,
+        };
+        out.push((bone, matrix));
+    }
+    Ok(out)
+}
+
+fn affine(m: &[f32], place: &str, w: &mut Warnings) -> Result<Affine3A> {
+    if let Some(k) = m.iter().position(|x| !x.is_finite()) {
+        return Err(value(place, "finite numbers", format!("{} at element {k}", m[k])));
+    }
+    if m[3] != 0.0 || m[7] != 0.0 || m[11] != 0.0 || (m[15] - 1.0).abs() > 1e-5 {
+        w.push(place, "its last row is not 0, 0, 0, 1; the row is ignored");
+    }
+    let columns = [m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10], m[12], m[13], m[14]];
+    Ok(Affine3A::from_cols_array(&columns))
+}
+
+/// All sets of joints and weights, side by side: influences a vertex, joints, weights.
+#[allow(clippy::type_complexity)]
+fn influences(
+    doc: &Document,
+    primitive: &Primitive,
+    place: &str,
+) -> Result<Option<(usize, Vec<u32>, Vec<f32>)>> {
+    let mut sets = Vec::new();
+    for set in 0.. {
+        let pair = (accessor(primitive, Semantic::Joints(set)), accessor(primitive, Semantic::Weights(set)));
+        let (Some(j), Some(w)) = pair else { break };
+        let joints = doc.integers(j, &[Type::Vec4], &format!("{place}.attributes.JOINTS_{set}"))?;
+        let weights = doc.floats(w, &[Type::Vec4], &format!("{place}.attributes.WEIGHTS_{set}"))?;
+        if joints.len() != weights.len() {
+            let expected = format!("as many weights as joints ({})", joints.len());
+            return Err(value(
+                format!("{place}.attributes.WEIGHTS_{set}"),
+                expected,
+                weights.len().to_string(),
+            ));
+        }
+        sets.push((joints, weights));
+    }
+    match sets.len() {
+        0 => Ok(None),
+        1 => Ok(sets.pop().map(|(j, w)| (4, j.values, w.values))),
+        n => {
+            let count = sets.iter().map(|s| s.0.len()).min().unwrap_or(0);
+            doc.charge((count * n) as u64 * 32, place)?;
+            let (mut joints, mut weights) = (Vec::new(), Vec::new());
+            for v in 0..count {
+                for (j, w) in &sets {
+                    joints.extend_from_slice(&j.values[4 * v..4 * v + 4]);
+                    weights.extend_from_slice(&w.values[4 * v..4 * v + 4]);
+                }
+            }
+            Ok(Some((4 * n, joints, weights)))
+        }
+    }
+}
