@@ -74,14 +74,17 @@ pub struct Import {
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
     /// The file cannot be opened.
-    #[error("{source}")]
-    Read {
-        /// What the system says.
-        source: std::io::Error,
-    },
+    #[error("{0}")]
+    Read(#[from] std::io::Error),
     /// No format that is known.
     #[error("{0}")]
     Unknown(String),
+    /// A glTF file.
+    #[error(transparent)]
+    Gltf(#[from] gltf::GltfError),
+    /// A rig of ours.
+    #[error(transparent)]
+    Rig(#[from] rig_json::RigError),
     /// A rig of the notes.
     #[error(transparent)]
     Notes(#[from] notes::NotesError),
@@ -93,14 +96,29 @@ pub enum ImportError {
 /// [`ImportError`]; the caller knows which file it named, the message says where in it.
 #[cfg(feature = "io")]
 pub fn import(path: &std::path::Path, options: &Options) -> Result<Import, ImportError> {
-    let bytes = std::fs::read(path).map_err(|source| ImportError::Read { source })?;
+    let bytes = read_file(path)?;
     let folder = path.parent().unwrap_or(std::path::Path::new(""));
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    match probe(&bytes) {
+    match probe(&bytes, &name) {
         Format::Notes => Ok(notes::import_bytes(&bytes, folder, options)?),
-        Format::Gltf | Format::Rig => Err(ImportError::Unknown(format!("{name}: not yet"))),
+        Format::Gltf => Ok(gltf::import(path, options)?),
+        Format::Rig => Ok(rig_json::import(path, options)?),
         Format::Unknown(why) => Err(ImportError::Unknown(why)),
     }
+}
+
+/// All bytes of a plain file; a folder, a pipe or a device is refused, since it may never end.
+///
+/// # Errors
+/// What the system says, or that it is no file.
+#[cfg(feature = "io")]
+pub fn read_file(path: &std::path::Path) -> std::io::Result<Vec<u8>> {
+    let kind = std::fs::metadata(path)?;
+    if kind.is_file() {
+        return std::fs::read(path);
+    }
+    let what = if kind.is_dir() { "a folder" } else { "a pipe or a device" };
+    Err(std::io::Error::other(format!("this is {what}; expected a file")))
 }
 
 #[cfg(feature = "io")]
@@ -113,7 +131,7 @@ enum Format {
 
 /// Tell formats apart by their first bytes, then by the keys of their JSON object.
 #[cfg(feature = "io")]
-fn probe(bytes: &[u8]) -> Format {
+fn probe(bytes: &[u8], name: &str) -> Format {
     use serde::de::IgnoredAny;
 
     #[derive(serde::Deserialize)]
@@ -125,7 +143,7 @@ fn probe(bytes: &[u8]) -> Format {
         model: Option<IgnoredAny>,
     }
 
-    if bytes.starts_with(b"glTF") {
+    if bytes.starts_with(b"glTF") || name.to_ascii_lowercase().ends_with(".gltf") {
         return Format::Gltf;
     }
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
