@@ -31,7 +31,13 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     poses: Option<PathBuf>,
     /// Seconds, separated by commas.
-    #[arg(long, value_name = "T0,T1,…", value_delimiter = ',', allow_hyphen_values = true, default_value = "0")]
+    #[arg(
+        long,
+        value_name = "T0,T1,…",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        default_value = "0"
+    )]
     times: Vec<f64>,
     /// The rest pose, untouched by any clip.
     #[arg(long, conflicts_with = "times")]

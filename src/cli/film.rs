@@ -168,10 +168,16 @@ fn gif(job: &Job, path: &Path, say: &Say) -> Result<FrameStats, Failure> {
     let few = n.min(PALETTE_FRAMES);
     let spread: Vec<(i64, f64)> = (0..few).map(|k| job.moments[k * n / few]).collect();
     let mut samples = Vec::with_capacity(few);
-    draw(job, &spread, || (), |(), picture| picture, |_, picture| {
-        samples.push(picture);
-        Ok(())
-    })?;
+    draw(
+        job,
+        &spread,
+        || (),
+        |(), picture| picture,
+        |_, picture| {
+            samples.push(picture);
+            Ok(())
+        },
+    )?;
     let palette = Palette::from_frames(&samples, 256, &film);
     let (dither, scores) = choose_dither(&samples, &palette, &film);
     drop(samples);
@@ -196,7 +202,10 @@ fn gif(job: &Job, path: &Path, say: &Say) -> Result<FrameStats, Failure> {
     bar.finish_and_clear();
     let (_, report) = writer.finish().map_err(failed)?;
     if report.dropped > 0 {
-        say.note(&format!("{} frames were too short for GIF; the film's length is right without them", report.dropped));
+        say.note(&format!(
+            "{} frames were too short for GIF; the film's length is right without them",
+            report.dropped
+        ));
     }
     file.commit().map_err(failed)?;
     Ok(stats)

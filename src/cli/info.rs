@@ -99,7 +99,13 @@ fn as_text(r: &Value) -> String {
     let generator = r["generator"].as_str().filter(|g| !g.is_empty()).map(|g| format!(", by {g}"));
     let _ = writeln!(t, "{}{}", r["format"].as_str().unwrap_or_default(), generator.unwrap_or_default());
     let roots = list("bones").iter().filter(|b| b["parent"].is_null()).count();
-    let _ = writeln!(t, "bones      {} ({} root{})", list("bones").len(), roots, if roots == 1 { "" } else { "s" });
+    let _ = writeln!(
+        t,
+        "bones      {} ({} root{})",
+        list("bones").len(),
+        roots,
+        if roots == 1 { "" } else { "s" }
+    );
     for (i, m) in list("meshes").iter().enumerate() {
         let closed = match (m["closed"].as_bool(), m["F"].as_u64()) {
             (Some(true), _) => "closed".to_string(),
@@ -111,7 +117,12 @@ fn as_text(r: &Value) -> String {
         let _ = writeln!(
             t,
             "mesh {i:<5} {}: V {} E {} F {}, Euler {}, {closed}, {} parts{targets}",
-            name(&m["name"]), m["V"], m["E"], m["F"], m["euler"], m["components"]
+            name(&m["name"]),
+            m["V"],
+            m["E"],
+            m["F"],
+            m["euler"],
+            m["components"]
         );
     }
     let _ = writeln!(t, "instances  {}", list("instances").len());
@@ -120,7 +131,8 @@ fn as_text(r: &Value) -> String {
         let (tracks, keys) = (&c["tracks"], &c["keys"]);
         let _ = writeln!(t, "clip {i:<5} {}: {seconds:.3} s, {tracks} tracks, {keys} keys", name(&c["name"]));
     }
-    for (key, many) in [("materials", "materials "), ("cameras", "cameras   "), ("extensions", "extensions")] {
+    for (key, many) in [("materials", "materials "), ("cameras", "cameras   "), ("extensions", "extensions")]
+    {
         let all: Vec<String> = list(key).iter().map(name).collect();
         if !all.is_empty() {
             let _ = writeln!(t, "{many} {}", all.join(", "));

@@ -45,7 +45,9 @@ enum Command {
     /// Print node matrices and vertex positions as JSON.
     Eval(eval::Args),
     /// Print a completion script for a shell.
-    #[command(after_help = "Example:\n  sinew completions bash > ~/.local/share/bash-completion/completions/sinew")]
+    #[command(
+        after_help = "Example:\n  sinew completions bash > ~/.local/share/bash-completion/completions/sinew"
+    )]
     Completions {
         /// Which shell.
         shell: clap_complete::Shell,
@@ -114,19 +116,14 @@ fn print(bytes: &[u8]) -> Result<(), Failure> {
 
 /// Read the input, show its warnings.
 fn load(path: &Path, options: Options, say: &Say) -> Result<Import, Failure> {
-    let import = io::import(path, &options)
-        .map_err(|e| Failure::Input(format!("{}: {e}", path.display())))?;
+    let import =
+        io::import(path, &options).map_err(|e| Failure::Input(format!("{}: {e}", path.display())))?;
     say.warnings(path, &import.warnings);
     Ok(import)
 }
 
 /// Read the input and, if poses are named, put them in the place of its clips.
-fn load_posed(
-    path: &Path,
-    poses: Option<&PathBuf>,
-    options: Options,
-    say: &Say,
-) -> Result<Import, Failure> {
+fn load_posed(path: &Path, poses: Option<&PathBuf>, options: Options, say: &Say) -> Result<Import, Failure> {
     let mut import = load(path, options, say)?;
     if let Some(file) = poses {
         let bad = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", file.display()));

@@ -142,7 +142,8 @@ fn moments(
         (None, Target::Still(_)) => Ok(vec![timed(1)]),
         (None, _) => {
             let count = frame_count(range, args.fps.fps(), MOST_FRAMES);
-            let count = count.map_err(|e| Failure::Run(format!("{}: {e} (--frames, --fps)", args.input.display())))?;
+            let count = count
+                .map_err(|e| Failure::Run(format!("{}: {e} (--frames, --fps)", args.input.display())))?;
             Ok((1..=count as i64).map(timed).collect())
         }
     }
