@@ -201,6 +201,7 @@ impl Mapper {
         let (light, code, w) = (&*LIGHT, &*CODE, row.len());
         let step = if backwards { -1 } else { 1 };
         let mut carried = [0i32; 3];
+        let mut last = ([0i32; 3], None);
         for k in 0..w {
             let x = if backwards { w - 1 - k } else { k };
             if self.film.is_hole(row[x][3]) {
@@ -211,7 +212,12 @@ impl Mapper {
             let wish: [i32; 3] = std::array::from_fn(|i| {
                 (light[usize::from(color[i])] + carried[i] + now[x + 1][i]).clamp(0, 65535)
             });
-            let index = self.nearest.of(wish.map(|l| code[(l >> 4) as usize]));
+            // Flat parts wish for the same again.
+            let index = match last {
+                (before, Some(index)) if before == wish => index,
+                _ => self.nearest.of(wish.map(|l| code[(l >> 4) as usize])),
+            };
+            last = (wish, Some(index));
             out[x] = index;
             // 7/16 ahead, 3/16 below behind, 5/16 below, 1/16 below ahead.
             let got = self.linear[usize::from(index)];

