@@ -13,7 +13,7 @@ const COARSE: usize = 4;
 
 /// Finds the colour with the least `Σ wᵢ·(aᵢ − bᵢ)²`; of equals, the first.
 ///
-/// A cell of 4³ colours lists the candidates that are nearest to any point of it, mostly one to five. Whether `p` can
+/// A cell of 4³ colours lists the candidates that are nearest to any point of it. Whether `p` can
 /// beat `q` in a box is decided exactly, because the difference of two squared distances is linear in the point.
 #[derive(Clone, Debug)]
 pub(super) struct Nearest {

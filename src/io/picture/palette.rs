@@ -13,7 +13,7 @@ pub struct Palette {
     colors: Vec<[u8; 3]>,
 }
 
-/// Distinct colours that are counted; beyond it neighbours are merged. 12 MB.
+/// Distinct colours that are counted; beyond it neighbours are merged. 8 MB.
 const MAX_DISTINCT: usize = 1 << 20;
 
 /// Colours that the clustering draws from.

@@ -9,9 +9,9 @@ pub enum PngLevel {
     /// A fraction of the time that drawing takes.
     #[default]
     Fast,
-    /// zlib's middle: smaller, about as dear as drawing the frame.
+    /// zlib's middle: on shaded balls 3 to 12 % smaller for thirty times the time.
     Balanced,
-    /// The smallest that the encoder can, at any price.
+    /// zlib's best: another 3 % for three times the time again.
     Best,
 }
 
