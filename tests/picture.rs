@@ -198,6 +198,44 @@ fn choose(frames: &[Rgba8], film: &Film) -> (Dither, [DitherScore; 3]) {
 }
 
 #[test]
+fn dithering_brings_back_what_three_greys_cannot_show() {
+    // A ramp that moves a little, so that its error is not the same in both frames.
+    let ramp = |k: usize| {
+        let data = (0..96 * 64).flat_map(|i| [[((i % 96 + k) * 2) as u8; 3].as_slice(), &[255]].concat());
+        Rgba8 { width: 96, height: 64, data: data.collect() }
+    };
+    let film = film([96, 64], 2, 24);
+    let palette = Palette::new(vec![[0; 3], [110; 3], [255; 3]]);
+    let (best, scores) = choose_dither(&[ramp(0), ramp(3)], &palette, &film);
+    let error = |d: Dither| scores.iter().find(|s| s.dither == d).unwrap().error;
+    assert!(error(Dither::FloydSteinberg) < 0.4 * error(Dither::None), "{scores:?}");
+    assert!(error(Dither::Ordered) < 0.6 * error(Dither::None), "{scores:?}");
+    assert_ne!(best, Dither::None);
+}
+
+#[test]
+fn a_dark_gradient_fills_the_palette() {
+    // Clustering alone gives the same 8-bit colours several times and leaves bands.
+    let data = (0..64 * 512usize).flat_map(|i| {
+        let t = (i / 64) as f64 / 512.0;
+        [(40.0 + 30.0 * t) as u8, (42.0 + 30.0 * t) as u8, (50.0 + 40.0 * t) as u8, 255]
+    });
+    let mut picture = Rgba8 { width: 64, height: 512, data: data.collect() };
+    // Enough other colours that not all fit.
+    for (i, p) in picture.data.as_chunks_mut::<4>().0.iter_mut().take(700).enumerate() {
+        *p = [(i % 250) as u8, (i % 97 * 2) as u8, (i / 7) as u8, 255];
+    }
+    let film = film([64, 512], 1, 24);
+    let palette = Palette::from_frames([&picture], 256, &film);
+    assert_eq!(palette.colors().len(), 255);
+    let mapped = Mapper::new(&palette, &film).map(&picture, Dither::None);
+    let rows = mapped.indices.chunks(64).skip(11).zip(picture.data.chunks(256).skip(11));
+    let worst =
+        rows.map(|(i, p)| (0..3).map(|c| palette.colors()[usize::from(i[0])][c].abs_diff(p[c])).max());
+    assert!(worst.flatten().max().unwrap() <= 1);
+}
+
+#[test]
 fn empty_and_transparent_films_have_palettes() {
     let clear = Rgba8 { width: 3, height: 2, data: vec![0; 24] };
     let film = Film { transparent: true, ..film([3, 2], 1, 24) };

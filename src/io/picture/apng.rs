@@ -9,6 +9,7 @@ use std::io::Write;
 
 /// Writes an APNG; memory holds one frame, whatever the length of the film.
 ///
+/// Lend it the stream (`&mut file`): an [`AtomicFile`](super::AtomicFile) is committed after [`finish`](Self::finish).
 /// A frame stores the rectangle that changed, without loss. Delays are the exact fraction of the film's rate.
 pub struct ApngWriter<W: Write> {
     writer: ::png::Writer<W>,

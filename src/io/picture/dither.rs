@@ -51,7 +51,7 @@ pub struct Mapper {
     palette: Palette,
     film: Film,
     nearest: Nearest,
-    linear: Vec<[i32; 3]>,
+    linear: Vec<[i32; 4]>,
     pairs: Vec<Pair>,
 }
 
@@ -79,7 +79,8 @@ const PAIRS: usize = 1 << 12;
 impl Mapper {
     /// For the frames of a film.
     pub fn new(palette: &Palette, film: &Film) -> Self {
-        let linear = palette.colors().iter().map(|c| c.map(|c| LIGHT[usize::from(c)])).collect();
+        let light = |c: &[u8; 3]| c.map(|c| LIGHT[usize::from(c)]);
+        let linear = palette.colors().iter().map(light).map(|[r, g, b]| [r, g, b, 0]).collect();
         let none = Pair { color: u32::MAX, indices: [0; 2], share: 0 };
         let nearest = Nearest::new(palette.colors());
         Self { palette: palette.clone(), film: *film, nearest, linear, pairs: vec![none; PAIRS] }
@@ -165,12 +166,12 @@ impl Mapper {
             std::array::from_fn(|i| (2 * i32::from(color[i]) - i32::from(near[i])).clamp(0, 255) as u8);
         let b = self.nearest.of(across);
         let [from, to] = [a, b].map(|i| self.linear[usize::from(i)]);
-        let dot = |p: [i32; 3], q: [i32; 3]| -> f64 {
+        let dot = |p: [i32; 4], q: [i32; 4]| -> f64 {
             (0..3).map(|i| f64::from(WEIGHT[i]) * f64::from(p[i] - from[i]) * f64::from(q[i] - from[i])).sum()
         };
-        let wish = color.map(|c| LIGHT[usize::from(c)]);
+        let [red, green, blue] = color.map(|c| LIGHT[usize::from(c)]);
         // The share that projects the wish onto the segment from one to the other.
-        let share = if a == b { 0.0 } else { dot(wish, to) / dot(to, to).max(1.0) };
+        let share = if a == b { 0.0 } else { dot([red, green, blue, 0], to) / dot(to, to).max(1.0) };
         Pair { color: key, indices: [a, b], share: (share * 256.0).clamp(0.0, 256.0) as u16 }
     }
 
@@ -178,52 +179,66 @@ impl Mapper {
     fn diffused(&mut self, frame: &Rgba8) -> Vec<u8> {
         let (w, h) = (frame.width, frame.height);
         let mut indices = vec![self.palette.transparent(); w * h];
-        // Errors of this row and the next, with a column to spare on either side.
-        let mut now = vec![[0i32; 3]; w + 2];
-        let mut next = now.clone();
+        // Errors that this row and the next receive from above.
+        let (mut now, mut next) = (vec![[0i32; 4]; w], vec![[0i32; 4]; w]);
         for (y, row) in frame.data.as_chunks::<4>().0.chunks(w.max(1)).enumerate() {
             let out = &mut indices[y * w..][..w];
-            self.diffuse_row(row, out, &mut now, &mut next, y % 2 == 1);
+            if y % 2 == 0 {
+                self.diffuse_row(row, out, &now, &mut next, |k| k);
+            } else {
+                self.diffuse_row(row, out, &now, &mut next, |k| w - 1 - k);
+            }
             std::mem::swap(&mut now, &mut next);
-            next.fill([0; 3]);
         }
         indices
     }
 
+    /// One row, in the order that `at` gives; `below` is overwritten with what the next row receives.
+    #[inline]
     fn diffuse_row(
         &mut self,
         row: &[[u8; 4]],
         out: &mut [u8],
-        now: &mut [[i32; 3]],
-        next: &mut [[i32; 3]],
-        backwards: bool,
+        above: &[[i32; 4]],
+        below: &mut [[i32; 4]],
+        at: impl Fn(usize) -> usize,
     ) {
-        let (light, code, w) = (&*LIGHT, &*CODE, row.len());
-        let step = if backwards { -1 } else { 1 };
-        let mut carried = [0i32; 3];
-        for k in 0..w {
-            let x = if backwards { w - 1 - k } else { k };
-            if self.film.is_hole(row[x][3]) {
-                carried = [0; 3];
-                continue;
+        let (light, code) = (&*LIGHT, &*CODE);
+        // Sums for the pixel ahead, and for those below it and behind it, stay in registers until they are complete.
+        let [mut ahead, mut under, mut behind] = [[0i32; 4]; 3];
+        let mut last = ([0i32; 4], None);
+        for k in 0..row.len() {
+            let x = at(k);
+            let mut error = [0; 4];
+            if !self.film.is_hole(row[x][3]) {
+                let [r, g, b] = self.film.over_matte(row[x]).map(|c| light[usize::from(c)]);
+                let wish = sum([r, g, b, 0], sum(ahead, above[x])).map(|l| l.clamp(0, 65535));
+                // Flat parts wish for the same again.
+                let index = match last {
+                    (before, Some(index)) if before == wish => index,
+                    _ => self.nearest.of([wish[0], wish[1], wish[2]].map(|l| code[(l >> 4) as usize])),
+                };
+                (out[x], last) = (index, (wish, Some(index)));
+                let got = self.linear[usize::from(index)];
+                error = std::array::from_fn(|i| wish[i] - got[i]);
             }
-            let color = self.film.over_matte(row[x]);
-            let wish: [i32; 3] = std::array::from_fn(|i| {
-                (light[usize::from(color[i])] + carried[i] + now[x + 1][i]).clamp(0, 65535)
-            });
-            let index = self.nearest.of(wish.map(|l| code[(l >> 4) as usize]));
-            out[x] = index;
             // 7/16 ahead, 3/16 below behind, 5/16 below, 1/16 below ahead.
-            let got = self.linear[usize::from(index)];
-            let error: [i32; 3] = std::array::from_fn(|i| wish[i] - got[i]);
-            carried = error.map(|e| e * 7 / 16);
-            for i in 0..3 {
-                next[(x as isize + 1 - step) as usize][i] += error[i] * 3 / 16;
-                next[x + 1][i] += error[i] * 5 / 16;
-                next[(x as isize + 1 + step) as usize][i] += error[i] / 16;
+            ahead = error.map(|e| e * 7 / 16);
+            if k > 0 {
+                below[at(k - 1)] = sum(behind, error.map(|e| e * 3 / 16));
             }
+            behind = sum(under, error.map(|e| e * 5 / 16));
+            under = error.map(|e| e / 16);
+        }
+        if let Some(k) = row.len().checked_sub(1) {
+            below[at(k)] = behind;
         }
     }
+}
+
+#[inline]
+fn sum(a: [i32; 4], b: [i32; 4]) -> [i32; 4] {
+    std::array::from_fn(|i| a[i] + b[i])
 }
 
 /// A threshold of 0…255 a pixel, spread evenly over the plane and over every neighbourhood.

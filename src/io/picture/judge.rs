@@ -29,10 +29,10 @@ impl DitherScore {
     }
 }
 
-/// Frames that are measured.
-const FRAMES: usize = 4;
+/// Frames that are measured: two tell the flicker, and more cost as much as drawing them.
+const FRAMES: usize = 2;
 
-/// The dithering with the smallest total on a few of the frames, and the figures of all.
+/// The dithering with the smallest total on the first and the middle one of the frames, and the figures of all.
 ///
 /// Of equals the simplest is taken, so a film with few colours is not dithered at all.
 pub fn choose_dither(frames: &[Rgba8], palette: &Palette, film: &Film) -> (Dither, [DitherScore; 3]) {

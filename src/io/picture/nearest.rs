@@ -13,7 +13,7 @@ const COARSE: usize = 4;
 
 /// Finds the colour with the least `Σ wᵢ·(aᵢ − bᵢ)²`; of equals, the first.
 ///
-/// A cell of 4³ colours lists the candidates that are nearest to any point of it, mostly one to five. Whether `p` can
+/// A cell of 4³ colours lists the candidates that are nearest to any point of it. Whether `p` can
 /// beat `q` in a box is decided exactly, because the difference of two squared distances is linear in the point.
 #[derive(Clone, Debug)]
 pub(super) struct Nearest {
@@ -22,7 +22,12 @@ pub(super) struct Nearest {
     /// `first << 9 | count` into `lists`; 0 where nobody asked yet.
     fine: Vec<u32>,
     lists: Vec<u8>,
+    /// Answers for exact colours, `color << 8 | index`, each in the place that its hash says.
+    known: Vec<u32>,
 }
+
+/// Bits of the places for known answers: 128 KB, which the second-level cache holds.
+const KNOWN: u32 = 15;
 
 impl Nearest {
     /// # Panics
@@ -32,23 +37,34 @@ impl Nearest {
         let colors: Vec<_> = colors.iter().map(|c| c.map(i32::from)).collect();
         let all: Vec<u8> = (0..colors.len()).map(|i| i as u8).collect();
         let coarse = (0..1 << (3 * COARSE)).map(|cell| candidates(&colors, &all, cell, COARSE)).collect();
-        Self { colors, coarse, fine: vec![0; 1 << (3 * FINE)], lists: Vec::new() }
+        // Black's place is 0; every other place starts with black, which no lookup there asks for.
+        let mut known = vec![0; 1 << KNOWN];
+        known[0] = u32::from(nearest(&colors, &all, [0; 3]));
+        Self { colors, coarse, fine: vec![0; 1 << (3 * FINE)], lists: Vec::new(), known }
     }
 
     /// Index of the nearest colour.
     #[inline]
     pub fn of(&mut self, color: [u8; 3]) -> u8 {
+        let key = u32::from_be_bytes([0, color[0], color[1], color[2]]);
+        let place = (key.wrapping_mul(0x9e37_79b1) >> (32 - KNOWN)) as usize;
+        let known = self.known[place];
+        if known >> 8 == key {
+            return known as u8;
+        }
+        let index = self.search(color);
+        self.known[place] = key << 8 | u32::from(index);
+        index
+    }
+
+    fn search(&mut self, color: [u8; 3]) -> u8 {
         let cell = cell_of(color, FINE);
         let mut entry = self.fine[cell];
         if entry == 0 {
             entry = self.fill(cell, color);
         }
         let (first, count) = ((entry >> 9) as usize, (entry & 511) as usize);
-        let list = &self.lists[first..first + count];
-        if let [only] = list {
-            return *only;
-        }
-        nearest(&self.colors, list, color.map(i32::from))
+        nearest(&self.colors, &self.lists[first..first + count], color.map(i32::from))
     }
 
     #[cold]
@@ -97,14 +113,9 @@ fn beats(p: [i32; 3], q: [i32; 3], low: [i32; 3], high: [i32; 3]) -> bool {
 /// The nearest of some colours, the first of equals.
 #[inline]
 fn nearest(colors: &[[i32; 3]], among: &[u8], x: [i32; 3]) -> u8 {
-    let mut best = (i32::MAX, 0);
-    for &i in among {
-        let d = distance(colors[i as usize], x);
-        if d < best.0 {
-            best = (d, i);
-        }
-    }
-    best.1
+    // Distance and index in one number, 21 bits and 8, so that the least needs no branch.
+    let key = |&i: &u8| distance(colors[usize::from(i)], x) << 8 | i32::from(i);
+    among.iter().map(key).min().unwrap_or(0) as u8
 }
 
 /// `Σ wᵢ·(aᵢ − bᵢ)²`

@@ -9,9 +9,9 @@ pub enum PngLevel {
     /// A fraction of the time that drawing takes.
     #[default]
     Fast,
-    /// zlib's middle: smaller, about as dear as drawing the frame.
+    /// zlib's middle: on shaded balls 3 to 12 % smaller for thirty times the time.
     Balanced,
-    /// The smallest that the encoder can, at any price.
+    /// zlib's best: another 3 % for three times the time again.
     Best,
 }
 
@@ -23,6 +23,11 @@ impl PngLevel {
             Self::Balanced => ::png::Compression::Balanced,
             Self::Best => ::png::Compression::High,
         });
+        // On shaded balls at 512² Paeth alone takes 0.72 ms and 72.2 KB a frame where trying all filters takes
+        // 1.14 ms and 72.2 KB; Sub takes 0.79 ms and 89.8 KB, Up 0.64 ms and 107.2 KB.
+        if self == Self::Fast {
+            encoder.set_filter(::png::Filter::Paeth);
+        }
     }
 }
 
