@@ -2,6 +2,8 @@
 //!
 //! Without the files every test here is reported as ignored; with `SINEW_DATA` set to a missing folder the run fails.
 
+mod gltf_oracle;
+mod sha256;
 mod support;
 
 use libtest_mimic::{Arguments, Trial};
@@ -20,4 +22,4 @@ fn main() {
 type Test = fn(&std::path::Path) -> Result<(), String>;
 
 /// Name and body of every test.
-const TESTS: &[(&str, Test)] = &[];
+const TESTS: &[(&str, Test)] = &[("gltf_agrees_with_the_oracle", gltf_oracle::run)];
