@@ -9,6 +9,7 @@ mod clips;
 mod compressed;
 mod container;
 mod document;
+mod draco;
 mod error;
 mod geometry;
 mod material;
