@@ -31,6 +31,11 @@ impl<'a> Source<'a> {
         Ok(Self { doc, primitive, place, packed: draco::decode(doc, primitive, place)? })
     }
 
+    /// The vertices come from a compressed stream.
+    pub fn is_packed(&self) -> bool {
+        self.packed.is_some()
+    }
+
     /// Fill in all lists but the triangles; `false` where the primitive has no positions.
     pub fn fill(&self, data: &mut MeshData, w: &mut Warnings) -> Result<bool> {
         let Some(positions) = self.floats(Semantic::Positions, &[Type::Vec3])? else { return Ok(false) };

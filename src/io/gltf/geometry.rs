@@ -138,7 +138,12 @@ impl Geometry {
         let built = match source.fill(&mut data, w)? {
             true => {
                 let influences = skins::influences(doc, &source, place)?;
-                let mesh = self.mesh(doc, primitive, data, source.indices()?, place, w)?;
+                let mut mode = primitive.mode;
+                if source.is_packed() {
+                    // Compressed streams hold whole triangles, whatever the primitive says.
+                    mode = Checked::Valid(Mode::Triangles);
+                }
+                let mesh = self.mesh(doc, primitive, mode, data, source.indices()?, place, w)?;
                 self.meshes.push(mesh);
                 Some(Built { mesh: MeshId(self.meshes.len() as u32 - 1), influences })
             }
@@ -156,12 +161,13 @@ impl Geometry {
         &mut self,
         doc: &Document,
         primitive: &Primitive,
+        mode: Checked<Mode>,
         mut data: MeshData,
         indices: Option<Vec<u32>>,
         place: &str,
         w: &mut Warnings,
     ) -> Result<Mesh> {
-        let Checked::Valid(mode) = primitive.mode else {
+        let Checked::Valid(mode) = mode else {
             return Err(value(format!("{place}.mode"), "0 to 6", "another number"));
         };
         if matches!(mode, Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
