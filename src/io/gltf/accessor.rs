@@ -113,6 +113,11 @@ impl Document<'_> {
         Ok(entry(&self.root.accessors, index, "accessor", || place.into())?.count.0)
     }
 
+    /// Numbers an element of an accessor.
+    pub fn width(&self, index: usize, shapes: &[Type], place: &str) -> Result<usize> {
+        Ok(self.described(index, shapes, place)?.1.width())
+    }
+
     fn described(&self, index: usize, shapes: &[Type], place: &str) -> Result<(&Accessor, Layout)> {
         let accessor = entry(&self.root.accessors, index, "accessor", || place.into())?;
         let at = |field| format!("accessors[{index}].{field}");

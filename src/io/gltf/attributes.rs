@@ -1,6 +1,8 @@
 //! Vertex attributes of a primitive, its morph targets and its indices.
 
+use super::accessor::Elements;
 use super::document::Document;
+use super::draco::{self, Decoded};
 use super::error::Result;
 use super::warnings::Warnings;
 use crate::mesh::normals::{self, Weighting};
@@ -15,62 +17,102 @@ pub(super) fn accessor(primitive: &Primitive, semantic: Semantic) -> Option<usiz
     primitive.attributes.get(&Checked::Valid(semantic)).map(|i| i.value())
 }
 
-/// Fill `data`; returns the indices, or `None` where the primitive has no positions.
-#[allow(clippy::type_complexity)]
-pub(super) fn read(
-    doc: &Document,
-    primitive: &Primitive,
-    data: &mut MeshData,
-    place: &str,
-    w: &mut Warnings,
-) -> Result<Option<Option<Vec<u32>>>> {
-    let Some(positions) = accessor(primitive, Semantic::Positions) else { return Ok(None) };
-    let source = Source { doc, primitive, place };
-    data.positions = vec3s(doc, positions, &format!("{place}.attributes.POSITION"))?;
-    if data.positions.is_empty() {
-        return Ok(None);
-    }
-    if let Some(v) = source.floats(Semantic::Normals, &[Type::Vec3])? {
-        data.normals = v.chunks_exact(3).map(Vec3::from_slice).collect();
-    }
-    if let Some(v) = source.floats(Semantic::Tangents, &[Type::Vec4])? {
-        data.tangents = v.chunks_exact(4).map(Vec4::from_slice).collect();
-    }
-    for set in 0..2 {
-        if let Some(v) = source.floats(Semantic::TexCoords(set), &[Type::Vec2])? {
-            data.uvs[set as usize] = v.chunks_exact(2).map(Vec2::from_slice).collect();
-        }
-    }
-    data.colors = source.colors()?;
-    data.targets = source.targets()?;
-    sane(data, place, w);
-    let indices = match primitive.indices {
-        Some(i) => Some(doc.integers(i.value(), &[Type::Scalar], &format!("{place}.indices"))?.values),
-        None => None,
-    };
-    Ok(Some(indices))
-}
-
-struct Source<'a> {
+/// Where the vertices of a primitive come from: its accessors, or a compressed stream.
+pub(super) struct Source<'a> {
     doc: &'a Document<'a>,
     primitive: &'a Primitive,
     place: &'a str,
+    packed: Option<Decoded>,
 }
 
-impl Source<'_> {
-    fn floats(&self, semantic: Semantic, shapes: &[Type]) -> Result<Option<Vec<f32>>> {
-        let Some(index) = accessor(self.primitive, semantic.clone()) else { return Ok(None) };
-        let place = format!("{}.attributes.{}", self.place, semantic.to_string());
-        Ok(Some(self.doc.floats(index, shapes, &place)?.values))
+impl<'a> Source<'a> {
+    /// Decode the primitive's stream, if it has one.
+    pub fn new(doc: &'a Document<'a>, primitive: &'a Primitive, place: &'a str) -> Result<Self> {
+        Ok(Self { doc, primitive, place, packed: draco::decode(doc, primitive, place)? })
     }
 
-    /// RGB means opaque.
-    fn colors(&self) -> Result<Vec<Vec4>> {
-        let Some(index) = accessor(self.primitive, Semantic::Colors(0)) else { return Ok(Vec::new()) };
-        let place = format!("{}.attributes.COLOR_0", self.place);
-        let elements = self.doc.floats(index, &[Type::Vec3, Type::Vec4], &place)?;
-        let one = |c: &[f32]| Vec4::new(c[0], c[1], c[2], c.get(3).copied().unwrap_or(1.0));
-        Ok(elements.iter().map(one).collect())
+    /// The vertices come from a compressed stream.
+    pub fn is_packed(&self) -> bool {
+        self.packed.is_some()
+    }
+
+    /// Fill in all lists but the triangles; `false` where the primitive has no positions.
+    pub fn fill(&self, data: &mut MeshData, w: &mut Warnings) -> Result<bool> {
+        let Some(positions) = self.floats(Semantic::Positions, &[Type::Vec3])? else { return Ok(false) };
+        if positions.values.is_empty() {
+            return Ok(false);
+        }
+        data.positions = positions.iter().map(Vec3::from_slice).collect();
+        if let Some(v) = self.floats(Semantic::Normals, &[Type::Vec3])? {
+            data.normals = v.iter().map(Vec3::from_slice).collect();
+        }
+        if let Some(v) = self.floats(Semantic::Tangents, &[Type::Vec4])? {
+            data.tangents = v.iter().map(Vec4::from_slice).collect();
+        }
+        for set in 0..2 {
+            if let Some(v) = self.floats(Semantic::TexCoords(set), &[Type::Vec2])? {
+                data.uvs[set as usize] = v.iter().map(Vec2::from_slice).collect();
+            }
+        }
+        if let Some(v) = self.floats(Semantic::Colors(0), &[Type::Vec3, Type::Vec4])? {
+            // RGB means opaque.
+            let one = |c: &[f32]| Vec4::new(c[0], c[1], c[2], c.get(3).copied().unwrap_or(1.0));
+            data.colors = v.iter().map(one).collect();
+        }
+        data.targets = self.targets()?;
+        sane(data, self.place, w);
+        Ok(true)
+    }
+
+    /// The indices, if there are any.
+    pub fn indices(&self) -> Result<Option<Vec<u32>>> {
+        match (&self.packed, self.primitive.indices) {
+            (Some(packed), _) => Ok(Some(packed.indices())),
+            (None, Some(i)) => {
+                let place = format!("{}.indices", self.place);
+                Ok(Some(self.doc.integers(i.value(), &[Type::Scalar], &place)?.values))
+            }
+            (None, None) => Ok(None),
+        }
+    }
+
+    /// An attribute as f32.
+    pub fn floats(&self, semantic: Semantic, shapes: &[Type]) -> Result<Option<Elements<f32>>> {
+        let Some(index) = accessor(self.primitive, semantic.clone()) else { return Ok(None) };
+        let place = self.at(&semantic);
+        if let Some(values) = self.unpacked(&semantic, index, shapes, &place)? {
+            return Ok(Some(values));
+        }
+        Ok(Some(self.doc.floats(index, shapes, &place)?))
+    }
+
+    /// An attribute of whole numbers.
+    pub fn integers(&self, semantic: Semantic, shapes: &[Type]) -> Result<Option<Elements<u32>>> {
+        let Some(index) = accessor(self.primitive, semantic.clone()) else { return Ok(None) };
+        let place = self.at(&semantic);
+        if let Some(e) = self.unpacked(&semantic, index, shapes, &place)? {
+            let values = e.values.iter().map(|&v| v as u32).collect();
+            return Ok(Some(Elements { width: e.width, values }));
+        }
+        Ok(Some(self.doc.integers(index, shapes, &place)?))
+    }
+
+    fn at(&self, semantic: &Semantic) -> String {
+        format!("{}.attributes.{}", self.place, semantic.to_string())
+    }
+
+    fn unpacked(
+        &self,
+        semantic: &Semantic,
+        index: usize,
+        shapes: &[Type],
+        place: &str,
+    ) -> Result<Option<Elements<f32>>> {
+        let Some(packed) = &self.packed else { return Ok(None) };
+        let width = self.doc.width(index, shapes, place)?;
+        self.doc.charge((packed.count() * width) as u64 * 4, place)?;
+        let values = packed.floats(self.doc, &semantic.to_string(), index, width);
+        Ok(values.map(|values| Elements { width, values }))
     }
 
     fn targets(&self) -> Result<Vec<MorphTarget>> {

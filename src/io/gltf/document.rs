@@ -10,8 +10,8 @@ use std::path::Path;
 
 /// Decoded data that any file may ask for.
 const FREE_BYTES: u64 = 256 << 20;
-/// Decoded data allowed for each byte of the file: one byte of colour becomes four of f32, and primitives share accessors.
-const BYTES_A_BYTE: u64 = 8;
+/// Decoded data allowed for each byte of the file: packed vertices take two bytes each, and primitives share accessors.
+const BYTES_A_BYTE: u64 = 32;
 
 /// A glTF file: its typed JSON and its buffers.
 pub(super) struct Document<'a> {

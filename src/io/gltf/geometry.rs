@@ -1,11 +1,12 @@
 //! Primitives become meshes, and nodes that show them become instances.
 
+use super::attributes::{self, Source};
 use super::document::Document;
 use super::error::{GltfError, Result, entry, value};
 use super::nodes::{Nodes, bone};
+use super::skins::{self, Influences};
 use super::triangles::triangles;
 use super::warnings::Warnings;
-use super::{attributes, skins};
 use crate::character::{Binding, Instance, MeshId};
 use crate::io::PrimitiveSource;
 use crate::mesh::{MaterialId, Mesh, MeshData};
@@ -34,7 +35,13 @@ pub(super) struct Geometry {
     pub runs: Runs,
     /// A primitive has no material of its own, so the default one is needed.
     pub default_material: bool,
-    done: BTreeMap<(usize, usize), Option<MeshId>>,
+    done: BTreeMap<(usize, usize), Option<Built>>,
+}
+
+/// A primitive that was read.
+struct Built {
+    mesh: MeshId,
+    influences: Option<Influences>,
 }
 
 /// Build all instances of the scene, nodes in the order of the file.
@@ -70,19 +77,20 @@ impl Geometry {
         let run = self.rest_run(doc, node, mesh, w)?;
         for (p, primitive) in json.primitives.iter().enumerate() {
             let place = format!("meshes[{mesh}].primitives[{p}]");
-            let Some(id) = self.mesh(doc, mesh, p, primitive, &place, w)? else { continue };
+            self.read(doc, mesh, p, primitive, &place, w)?;
+            let Some(Some(built)) = self.done.get(&(mesh, p)) else { continue };
+            let count = self.meshes[built.mesh.0 as usize].positions.len();
             let skin = doc.root.nodes[node].skin.map(|s| s.value());
-            let binding = match skin {
-                Some(skin) => {
-                    skins.bind(doc, nodes, node, skin, primitive, &self.meshes[id.0 as usize], &place, w)?
+            let binding = match (skin, &built.influences) {
+                (Some(skin), Some(i)) => skins.bind(doc, nodes, (node, skin), i, count, &place, w)?,
+                (skin, _) => {
+                    if skin.is_some() {
+                        w.push(&place, "has a skin but no joints and weights; it moves with its node");
+                    }
+                    Binding::Bone(bone(nodes, node, || place.clone())?)
                 }
-                None => None,
             };
-            let binding = match binding {
-                Some(b) => b,
-                None => Binding::Bone(bone(nodes, node, || place.clone())?),
-            };
-            self.instances.push(Instance { mesh: id, binding, first_weight: run });
+            self.instances.push(Instance { mesh: built.mesh, binding, first_weight: run });
             self.sources.push(PrimitiveSource { node: node as u32, mesh: mesh as u32, primitive: p as u32 });
         }
         Ok(())
@@ -111,45 +119,55 @@ impl Geometry {
         Ok(first)
     }
 
-    /// The mesh of a primitive, built once; `None` where there are no positions.
+    /// Read a primitive, once.
+    fn read(
+        &mut self,
+        doc: &Document,
+        mesh: usize,
+        p: usize,
+        primitive: &Primitive,
+        place: &str,
+        w: &mut Warnings,
+    ) -> Result<()> {
+        if self.done.contains_key(&(mesh, p)) {
+            return Ok(());
+        }
+        let name = doc.root.meshes[mesh].name.clone().unwrap_or_else(|| format!("mesh_{mesh}"));
+        let mut data = MeshData { name: format!("{name}.{p}"), ..Default::default() };
+        let source = Source::new(doc, primitive, place)?;
+        let built = match source.fill(&mut data, w)? {
+            true => {
+                let influences = skins::influences(doc, &source, place)?;
+                let mut mode = primitive.mode;
+                if source.is_packed() {
+                    // Compressed streams hold whole triangles, whatever the primitive says.
+                    mode = Checked::Valid(Mode::Triangles);
+                }
+                let mesh = self.mesh(doc, primitive, mode, data, source.indices()?, place, w)?;
+                self.meshes.push(mesh);
+                Some(Built { mesh: MeshId(self.meshes.len() as u32 - 1), influences })
+            }
+            false => {
+                w.push(place, "has no positions; left out");
+                None
+            }
+        };
+        self.done.insert((mesh, p), built);
+        Ok(())
+    }
+
+    /// Triangles, material and what follows from them.
     fn mesh(
         &mut self,
         doc: &Document,
-        mesh: usize,
-        p: usize,
         primitive: &Primitive,
+        mode: Checked<Mode>,
+        mut data: MeshData,
+        indices: Option<Vec<u32>>,
         place: &str,
         w: &mut Warnings,
-    ) -> Result<Option<MeshId>> {
-        if let Some(done) = self.done.get(&(mesh, p)) {
-            return Ok(*done);
-        }
-        let built = self.build_mesh(doc, mesh, p, primitive, place, w)?;
-        let id = built.map(|m| {
-            self.meshes.push(m);
-            MeshId(self.meshes.len() as u32 - 1)
-        });
-        self.done.insert((mesh, p), id);
-        Ok(id)
-    }
-
-    fn build_mesh(
-        &mut self,
-        doc: &Document,
-        mesh: usize,
-        p: usize,
-        primitive: &Primitive,
-        place: &str,
-        w: &mut Warnings,
-    ) -> Result<Option<Mesh>> {
-        let name = doc.root.meshes[mesh].name.clone().unwrap_or_else(|| format!("mesh_{mesh}"));
-        let mut data = MeshData { name: format!("{name}.{p}"), ..Default::default() };
-        let indices = attributes::read(doc, primitive, &mut data, place, w)?;
-        let Some(indices) = indices else {
-            w.push(place, "has no positions; left out");
-            return Ok(None);
-        };
-        let Checked::Valid(mode) = primitive.mode else {
+    ) -> Result<Mesh> {
+        let Checked::Valid(mode) = mode else {
             return Err(value(format!("{place}.mode"), "0 to 6", "another number"));
         };
         if matches!(mode, Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
@@ -158,7 +176,7 @@ impl Geometry {
         data.triangles = triangles(mode, indices, data.positions.len(), place, w)?;
         data.material = Some(self.material(doc, primitive, place)?);
         attributes::complete(doc, primitive, &mut data);
-        Mesh::new(data).map(Some).map_err(|source| GltfError::Mesh { place: place.into(), source })
+        Mesh::new(data).map_err(|source| GltfError::Mesh { place: place.into(), source })
     }
 
     fn material(&mut self, doc: &Document, primitive: &Primitive, place: &str) -> Result<MaterialId> {

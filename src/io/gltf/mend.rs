@@ -74,20 +74,35 @@ fn texture_sources(value: &mut Value) {
     }
 }
 
-/// Channels without a node move something of an extension's (KHR_animation_pointer); we have nothing there to move.
+/// A channel without a node points by path (KHR_animation_pointer). A path to a node's transform or weights is as good as a
+/// node; of anything else we have nothing that could move.
 fn channels_without_node(value: &mut Value, warnings: &mut Warnings) {
     for (a, animation) in objects(value, "animations").enumerate() {
         let Some(channels) = animation.get_mut("channels").and_then(Value::as_array_mut) else { continue };
         let mut c = 0;
-        channels.retain(|channel| {
-            let kept = channel["target"].get("node").is_some() || channel.get("target").is_none();
+        channels.retain_mut(|channel| {
+            let kept = channel.get_mut("target").is_none_or(|t| t.get("node").is_some() || follow_pointer(t));
             if !kept {
                 let place = format!("animations[{a}].channels[{c}]");
-                warnings.push(place, "its target names no node; the channel is left out");
+                warnings.push(place, "its target is no node; the channel is left out");
             }
             c += 1;
             kept
         });
+    }
+}
+
+fn follow_pointer(target: &mut Value) -> bool {
+    let pointer = target["extensions"]["KHR_animation_pointer"]["pointer"].as_str().unwrap_or("");
+    let mut parts = pointer.strip_prefix("/nodes/").unwrap_or("").split('/');
+    let node = parts.next().and_then(|n| n.parse::<u32>().ok());
+    let path = parts.next().filter(|p| ["translation", "rotation", "scale", "weights"].contains(p));
+    match (node, path, parts.next()) {
+        (Some(node), Some(path), None) => {
+            *target = json!({ "node": node, "path": path });
+            true
+        }
+        _ => false,
     }
 }
 

@@ -9,12 +9,17 @@ mod clips;
 mod compressed;
 mod container;
 mod document;
+mod draco;
 mod error;
+mod extensions;
 mod geometry;
 mod material;
 mod mend;
+mod mounts;
 mod nodes;
+mod pictures;
 mod skins;
+mod surface;
 mod textures;
 mod triangles;
 mod uri;
@@ -59,6 +64,7 @@ pub fn import_bytes(
     let mut w = Warnings::default();
     let parts = container::split(bytes)?;
     let root = mend::root(parts.json, &mut w)?;
+    extensions::check(&root, &mut w)?;
     let doc = Document::new(root, parts.bin, base_dir, &mut w)?;
     assemble(&doc, base_dir, options, w)
 }
@@ -70,12 +76,14 @@ fn assemble(doc: &Document, base: Option<&Path>, options: &Options, mut w: Warni
     let looks = material::build(doc, base, options, geometry.default_material, &mut w)?;
     let character =
         Character::new(nodes.skeleton, geometry.meshes, geometry.instances, geometry.rest_weights, clips)?;
+    let cameras = mounts::cameras(doc, &nodes.in_scene, &nodes.bone_of, &mut w)?;
+    let lights = mounts::lights(doc, &nodes.in_scene, &nodes.bone_of, &character)?;
     let mut extensions = doc.root.extensions_used.clone();
     extensions.extend(doc.root.extensions_required.iter().cloned());
     extensions.sort();
     extensions.dedup();
     Ok(Import {
-        asset: Asset { character, materials: looks.materials, textures: looks.textures, ..Asset::default() },
+        asset: Asset { character, materials: looks.materials, textures: looks.textures, cameras, lights },
         format: "glTF".into(),
         generator: doc.root.asset.generator.clone().unwrap_or_default(),
         nodes: nodes.node_of,

@@ -1,16 +1,16 @@
 //! Skins: palettes of joints and inverse bind matrices, and the weights of vertices.
 
-use super::attributes::accessor;
+use super::accessor::Elements;
+use super::attributes::Source;
 use super::document::Document;
 use super::error::{GltfError, Result, entry, value};
 use super::nodes::{Nodes, bone};
 use super::warnings::Warnings;
 use crate::character::Binding;
-use crate::mesh::Mesh;
 use crate::skeleton::BoneId;
 use crate::skin::Weights;
 use ::gltf::json::accessor::Type;
-use ::gltf::json::mesh::{Primitive, Semantic};
+use ::gltf::json::mesh::Semantic;
 use glam::Affine3A;
 use std::collections::BTreeMap;
 
@@ -21,43 +21,39 @@ type Palette = Vec<(BoneId, Affine3A)>;
 pub(super) struct Skins(BTreeMap<usize, Palette>);
 
 impl Skins {
-    /// Bind a primitive to a skin; `None` where it has no joints or no weights.
+    /// Bind a primitive's vertices to a skin.
     pub fn bind(
         &mut self,
         doc: &Document,
         nodes: &Nodes,
-        node: usize,
-        skin: usize,
-        primitive: &Primitive,
-        mesh: &Mesh,
+        (node, skin): (usize, usize),
+        influences: &Influences,
+        count: usize,
         place: &str,
         w: &mut Warnings,
-    ) -> Result<Option<Binding>> {
+    ) -> Result<Binding> {
         if !self.0.contains_key(&skin) {
             let place = format!("nodes[{node}].skin");
             self.0.insert(skin, palette(doc, nodes, skin, &place, w)?);
         }
         let palette = &self.0[&skin];
-        let Some((per_vertex, joints, mut weights)) = influences(doc, primitive, place)? else {
-            w.push(place, "has a skin but no joints and weights; it moves with its node");
-            return Ok(None);
-        };
-        let count = mesh.positions.len();
-        if joints.len() != count * per_vertex || weights.len() != joints.len() {
-            let found = format!("{} joints and {} weights", joints.len(), weights.len());
-            return Err(value(place, format!("{per_vertex} joints and weights for {count} vertices"), found));
+        let Influences { per_vertex, joints, weights } = influences;
+        if joints.len() != count * per_vertex {
+            let expected = format!("joints and weights for {count} vertices");
+            return Err(value(place, expected, (joints.len() / per_vertex).to_string()));
         }
         doc.charge(palette.len() as u64 * 64 + joints.len() as u64 * 6, place)?;
 
         // Vertices without weight follow their first joint, as in other players.
         let mut empty = 0;
-        for (w, j) in weights.chunks_exact_mut(per_vertex).zip(joints.chunks_exact(per_vertex)) {
+        let mut weights = weights.clone();
+        for (w, j) in weights.chunks_exact_mut(*per_vertex).zip(joints.chunks_exact(*per_vertex)) {
             if w.iter().all(|&w| w == 0.0) && (j[0] as usize) < palette.len() {
                 empty += 1;
                 w[0] = 1.0;
             }
         }
-        let (weights, report) = Weights::new(per_vertex, &joints, &weights, palette.len(), 0)
+        let (weights, report) = Weights::new(*per_vertex, joints, &weights, palette.len(), 0)
             .map_err(|source| GltfError::Weights { place: place.into(), source })?;
         if empty + report.empty > 0 {
             let n = empty + report.empty;
@@ -73,7 +69,7 @@ impl Skins {
         if report.negative > 0 {
             w.push(place, format!("{} weights are negative; set to 0", report.negative));
         }
-        Ok(Some(Binding::Skin { palette: palette.clone(), weights }))
+        Ok(Binding::Skin { palette: palette.clone(), weights })
     }
 }
 
@@ -119,43 +115,39 @@ fn affine(m: &[f32], place: &str, w: &mut Warnings) -> Result<Affine3A> {
     Ok(Affine3A::from_cols_array(&columns))
 }
 
-/// All sets of joints and weights, side by side: influences a vertex, joints, weights.
-#[allow(clippy::type_complexity)]
-fn influences(
-    doc: &Document,
-    primitive: &Primitive,
-    place: &str,
-) -> Result<Option<(usize, Vec<u32>, Vec<f32>)>> {
+/// Joints and weights of a primitive's vertices.
+pub(super) struct Influences {
+    per_vertex: usize,
+    joints: Vec<u32>,
+    weights: Vec<f32>,
+}
+
+/// All sets of joints and weights, side by side; `None` without any.
+pub(super) fn influences(doc: &Document, source: &Source, place: &str) -> Result<Option<Influences>> {
     let mut sets = Vec::new();
     for set in 0.. {
-        let pair = (accessor(primitive, Semantic::Joints(set)), accessor(primitive, Semantic::Weights(set)));
-        let (Some(j), Some(w)) = pair else { break };
-        let joints = doc.integers(j, &[Type::Vec4], &format!("{place}.attributes.JOINTS_{set}"))?;
-        let weights = doc.floats(w, &[Type::Vec4], &format!("{place}.attributes.WEIGHTS_{set}"))?;
-        if joints.len() != weights.len() {
-            let expected = format!("as many weights as joints ({})", joints.len());
-            return Err(value(
-                format!("{place}.attributes.WEIGHTS_{set}"),
-                expected,
-                weights.len().to_string(),
-            ));
+        let joints = source.integers(Semantic::Joints(set), &[Type::Vec4])?;
+        let weights = source.floats(Semantic::Weights(set), &[Type::Vec4])?;
+        let (Some(j), Some(w)) = (joints, weights) else { break };
+        if j.len() != w.len() {
+            let at = format!("{place}.attributes.WEIGHTS_{set}");
+            return Err(value(at, format!("as many weights as joints ({})", j.len()), w.len().to_string()));
         }
-        sets.push((joints, weights));
+        sets.push((j, w));
     }
-    match sets.len() {
-        0 => Ok(None),
-        1 => Ok(sets.pop().map(|(j, w)| (4, j.values, w.values))),
-        n => {
-            let count = sets.iter().map(|s| s.0.len()).min().unwrap_or(0);
-            doc.charge((count * n) as u64 * 32, place)?;
-            let (mut joints, mut weights) = (Vec::new(), Vec::new());
-            for v in 0..count {
-                for (j, w) in &sets {
-                    joints.extend_from_slice(&j.values[4 * v..4 * v + 4]);
-                    weights.extend_from_slice(&w.values[4 * v..4 * v + 4]);
-                }
-            }
-            Ok(Some((4 * n, joints, weights)))
+    if sets.len() < 2 {
+        let one = |(j, w): (Elements<u32>, Elements<f32>)| (j.values, w.values);
+        let first = sets.pop().map(one);
+        return Ok(first.map(|(joints, weights)| Influences { per_vertex: 4, joints, weights }));
+    }
+    let count = sets.iter().map(|s| s.0.len()).min().unwrap_or(0);
+    doc.charge((count * sets.len()) as u64 * 32, place)?;
+    let mut out = Influences { per_vertex: 4 * sets.len(), joints: Vec::new(), weights: Vec::new() };
+    for v in 0..count {
+        for (j, w) in &sets {
+            out.joints.extend_from_slice(&j.values[4 * v..4 * v + 4]);
+            out.weights.extend_from_slice(&w.values[4 * v..4 * v + 4]);
         }
     }
+    Ok(Some(out))
 }
