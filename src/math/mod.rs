@@ -2,6 +2,7 @@
 
 pub mod euler;
 pub mod rotation;
+pub mod simd;
 pub mod spline;
 mod transform;
 

@@ -4,10 +4,7 @@ mod shade;
 
 pub mod raster;
 
-use crate::image::{Image, Rgba8};
-use crate::scene::Scene;
-
-/// How a picture is made; what is on it is the [`Scene`].
+/// How a picture is made; what is on it is the [`Scene`](crate::scene::Scene).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Pixels a row.
@@ -18,6 +15,44 @@ pub struct Settings {
     pub samples: u8,
     /// Worker threads; the picture does not depend on them.
     pub threads: usize,
+}
+
+/// Settings that no picture can be made with.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SettingsError {
+    /// Larger than a rasterizer's fixed-point range.
+    #[error("a picture of {width}×{height} pixels is too large: at most {max} along each side", max = Settings::MAX_SIZE)]
+    Size {
+        /// Pixels a row.
+        width: usize,
+        /// Rows.
+        height: usize,
+    },
+    /// Neither 1 nor 4.
+    #[error("{found} samples a pixel: 1 or 4 are possible")]
+    Samples {
+        /// What was asked for.
+        found: u8,
+    },
+}
+
+impl Settings {
+    /// The most pixels along a side.
+    pub const MAX_SIZE: usize = 16384;
+
+    /// Whether a picture can be made so. A picture without pixels can.
+    ///
+    /// # Errors
+    /// [`SettingsError`]: too large, or a number of samples that is neither 1 nor 4.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        if self.width > Self::MAX_SIZE || self.height > Self::MAX_SIZE {
+            return Err(SettingsError::Size { width: self.width, height: self.height });
+        }
+        match self.samples {
+            1 | 4 => Ok(()),
+            found => Err(SettingsError::Samples { found }),
+        }
+    }
 }
 
 impl Default for Settings {

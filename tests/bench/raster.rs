@@ -1,1 +1,81 @@
-fn main() {}
+//! Milliseconds a picture of a Blinn-Phong sphere, one thread: `cargo bench --bench raster`.
+
+use glam::Vec3;
+use sinew::image::Rgba8;
+use sinew::mesh::{Mesh, MeshData};
+use sinew::render::{Settings, raster::Rasterizer};
+use sinew::scene::{Camera, Light, LightKind, Material, Object, Projection, Scene};
+use std::f32::consts::PI;
+use std::time::Instant;
+
+/// A bumpy sphere of about `n` triangles, with a sphere's normals.
+fn sphere(n: usize) -> Mesh {
+    let v = (n as f32 / 4.0).sqrt().round() as u32;
+    let u = 2 * v;
+    let mut data = MeshData::default();
+    for j in 0..=v {
+        for i in 0..=u {
+            let (theta, phi) = (PI * j as f32 / v as f32, 2.0 * PI * i as f32 / u as f32);
+            let d = Vec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
+            let bump = (7.0 * d.x + 1.0).sin() * (9.0 * d.y).sin() * (8.0 * d.z + 2.0).sin();
+            data.positions.push(d * (1.0 + 0.12 * bump));
+            data.normals.push(d);
+        }
+    }
+    for a in (0..v).flat_map(|j| (0..u).map(move |i| j * (u + 1) + i)) {
+        data.triangles.extend([[a, a + 1, a + u + 1], [a + 1, a + u + 2, a + u + 1]]);
+    }
+    Mesh::new(data).expect("a sphere is a mesh")
+}
+
+fn main() {
+    let material = [Material {
+        diffuse: Vec3::new(0.8, 0.5, 0.3).extend(1.0),
+        specular: Vec3::splat(0.5),
+        ..Default::default()
+    }];
+    let projection = Projection::Perspective { fov_y: 50f32.to_radians() };
+    let mut rasterizer = Rasterizer::default();
+    println!("triangles    picture  samples  ms/frame");
+    for n in [10_000, 100_000, 1_000_000] {
+        let mesh = sphere(n);
+        let camera = Camera::look_at(Vec3::Z * 2.9, Vec3::ZERO, Vec3::Y, projection).expect("it looks ahead");
+        let object = Object {
+            mesh: &mesh,
+            positions: &mesh.positions,
+            normals: &mesh.normals,
+            tangents: &[],
+            material: 0,
+            mirrored: false,
+        };
+        let light = Light {
+            kind: LightKind::Point { position: Vec3::new(3.0, 5.0, 4.0), falloff: None },
+            color: Vec3::ONE,
+        };
+        let scene = Scene {
+            camera,
+            ambient: Vec3::splat(0.05),
+            lights: vec![light],
+            background: [0.0; 4],
+            objects: vec![object],
+            materials: &material,
+            textures: &[],
+        };
+        for (width, height) in [(512, 512), (1920, 1080)] {
+            for samples in [1, 4] {
+                let settings = Settings { width, height, samples, threads: 1 };
+                let mut picture = Rgba8::default();
+                rasterizer.draw(&scene, &settings, &mut picture);
+                let mut times: Vec<f64> = (0..15)
+                    .map(|_| {
+                        let start = Instant::now();
+                        rasterizer.draw(&scene, &settings, &mut picture);
+                        start.elapsed().as_secs_f64() * 1e3
+                    })
+                    .collect();
+                times.sort_by(f64::total_cmp);
+                println!("{n:9}  {width:4}×{height:<4}  {samples:7}  {:8.2}", times[7]);
+            }
+        }
+    }
+}

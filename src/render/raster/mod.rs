@@ -1,1 +1,205 @@
+//! Triangles to pixels: a visibility buffer first, then shading once a pixel, eight pixels at a time.
+//!
+//! 1. `vertex`: each vertex to the picture plane, once, in 1/256 pixels.
+//! 2. `setup`: each triangle is culled, clipped, and put into the lists of the 64×64 tiles that it meets; triangles of a
+//!    few pixels become single samples there and then.
+//! 3. `tile`: each tile finds what is visible at each sample; `resolve` shades that and writes the colours.
+//!
+//! Samples are decided in integers and ties by the order of submission, so the picture does not depend on the number of
+//! threads, on the machine, or on the order in which tiles are drawn.
 
+mod clip;
+mod encode;
+mod fill;
+mod frame;
+mod resolve;
+mod setup;
+mod surface;
+mod tile;
+mod vertex;
+
+use super::Settings;
+use crate::image::{Image, Rgba8};
+use crate::math::simd::{self, Isa};
+use crate::scene::Scene;
+use encode::Target;
+use frame::Frame;
+use setup::Bins;
+use tile::TileScratch;
+
+/// Pixels along a tile's side.
+pub(crate) const TILE: usize = 64;
+
+/// Object, triangle and depth of each pixel's centre, row by row from the top left.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct IdImage {
+    /// Pixels a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Index of the object plus one; 0 where nothing is.
+    pub objects: Vec<u32>,
+    /// Index of the triangle in its mesh; 0 where nothing is.
+    pub triangles: Vec<u32>,
+    /// Distance along the view direction, metres; infinite where nothing is.
+    pub depth: Vec<f32>,
+}
+
+/// What was done for a picture, counted exactly.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct Stats {
+    /// Triangles submitted.
+    pub triangles: u64,
+    /// Vertices carried to the picture plane.
+    pub vertices: u64,
+    /// Triangles left out because a coordinate is not finite, or because their object's lists do not fit its mesh.
+    pub skipped: u64,
+    /// Triangles seen from behind or edge-on.
+    pub culled: u64,
+    /// Triangles whose bounds hold no sample of the picture, or that lie before the near plane.
+    pub missed: u64,
+    /// Triangles cut by the near plane or by the bounds of the fixed-point range.
+    pub clipped: u64,
+    /// Triangles drawn: what is left of `triangles` after `skipped`, `culled` and `missed`.
+    pub drawn: u64,
+    /// Samples where something opaque is seen.
+    pub samples: u64,
+    /// Evaluations of the shading equation.
+    pub shaded: u64,
+}
+
+impl Stats {
+    fn add(&mut self, o: &Self) {
+        self.triangles += o.triangles;
+        self.vertices += o.vertices;
+        self.skipped += o.skipped;
+        self.culled += o.culled;
+        self.missed += o.missed;
+        self.clipped += o.clipped;
+        self.drawn += o.drawn;
+        self.samples += o.samples;
+        self.shaded += o.shaded;
+    }
+}
+
+/// Draws scenes; keeps its buffers from one picture to the next.
+///
+/// ```
+/// use glam::Vec3;
+/// use sinew::image::Rgba8;
+/// use sinew::mesh::{Mesh, MeshData};
+/// use sinew::render::{Settings, raster::Rasterizer};
+/// use sinew::scene::{Camera, Material, Object, Projection, Scene};
+///
+/// let positions = vec![Vec3::new(-2.0, -2.0, 0.0), Vec3::new(2.0, -2.0, 0.0), Vec3::new(0.0, 4.0, 0.0)];
+/// let mesh = Mesh::new(MeshData { positions, triangles: vec![[0, 1, 2]], ..Default::default() }).unwrap();
+/// let object = Object {
+///     mesh: &mesh, positions: &mesh.positions, normals: &[], tangents: &[], material: 0, mirrored: false,
+/// };
+/// let camera = Camera::look_at(Vec3::Z * 3.0, Vec3::ZERO, Vec3::Y, Projection::Orthographic { height: 1.0 });
+/// let scene = Scene {
+///     camera: camera.unwrap(), ambient: Vec3::ONE, lights: vec![], background: [0.0; 4],
+///     objects: vec![object], materials: &[Material::default()], textures: &[],
+/// };
+/// let mut picture = Rgba8::default();
+/// let settings = Settings { width: 4, height: 4, samples: 4, threads: 1 };
+/// let stats = Rasterizer::default().draw(&scene, &settings, &mut picture);
+/// assert_eq!((stats.drawn, stats.shaded, stats.samples), (1, 16, 64));
+/// // sRGB of 0.8.
+/// assert_eq!(picture.data[..4], [231, 231, 231, 255]);
+/// ```
+#[derive(Debug, Default)]
+pub struct Rasterizer {
+    isa: Isa,
+    vertices: vertex::Vertices,
+    bins: Vec<Bins>,
+    tiles: Vec<TileScratch>,
+}
+
+impl Rasterizer {
+    /// One that uses the given build of its kernels; the pictures are the same.
+    pub fn with_isa(isa: Isa) -> Self {
+        Self { isa, ..Self::default() }
+    }
+
+    /// Draw to 8-bit sRGB with straight alpha; `out` takes the size of `settings`.
+    ///
+    /// # Panics
+    /// If `settings` do not pass [`Settings::check`].
+    pub fn draw(&mut self, scene: &Scene, settings: &Settings, out: &mut Rgba8) -> Stats {
+        (out.width, out.height) = (settings.width, settings.height);
+        out.data.resize(4 * settings.width * settings.height, 0);
+        self.paint(scene, settings, encode::rgba8_bands(out))
+    }
+
+    /// Draw to linear light with premultiplied alpha; `out` takes the size of `settings`.
+    ///
+    /// # Panics
+    /// If `settings` do not pass [`Settings::check`].
+    pub fn draw_linear(&mut self, scene: &Scene, settings: &Settings, out: &mut Image) -> Stats {
+        (out.width, out.height) = (settings.width, settings.height);
+        out.pixels.resize(settings.width * settings.height, [0.0; 4]);
+        self.paint(scene, settings, encode::linear_bands(out))
+    }
+
+    /// Draw what is where, at pixel centres; masks and transparency count as in a picture, but nothing that blends is
+    /// in it.
+    ///
+    /// # Panics
+    /// If `settings` do not pass [`Settings::check`].
+    pub fn draw_ids(&mut self, scene: &Scene, settings: &Settings, out: &mut IdImage) -> Stats {
+        let n = settings.width * settings.height;
+        (out.width, out.height) = (settings.width, settings.height);
+        out.objects.resize(n, 0);
+        out.triangles.resize(n, 0);
+        out.depth.resize(n, f32::INFINITY);
+        self.paint(scene, &Settings { samples: 1, ..*settings }, encode::id_bands(out))
+    }
+
+    /// All stages; `bands` are the rows of tiles of the output.
+    fn paint(&mut self, scene: &Scene, settings: &Settings, bands: Vec<Target>) -> Stats {
+        settings.check().expect("settings are checked by the caller");
+        let frame = Frame::new(scene, settings);
+        let threads = settings.threads.max(1);
+        let mut stats = frame.stats;
+        if bands.is_empty() {
+            return stats;
+        }
+
+        // Carry the vertices, then sort the triangles into tiles: one contiguous share of the list a thread.
+        self.vertices.fill(self.isa, &frame, threads);
+        self.bins.resize_with(threads.max(self.bins.len()), Bins::default);
+        let (isa, vertices) = (self.isa, &self.vertices);
+        let shares: Vec<(usize, &mut Bins)> = self.bins[..threads].iter_mut().enumerate().collect();
+        each(shares, threads, |(k, bins)| bins.fill(isa, &frame, vertices, k, threads));
+
+        // Draw the rows of tiles.
+        self.tiles.resize_with(threads.max(self.tiles.len()), TileScratch::default);
+        let bins = &self.bins[..threads];
+        let rows = std::sync::Mutex::new(bands.into_iter().enumerate());
+        let workers: Vec<&mut TileScratch> = self.tiles[..threads].iter_mut().collect();
+        each(workers, threads, |scratch| {
+            scratch.stats = Stats::default();
+            loop {
+                let next = rows.lock().expect("no worker panics").next();
+                let Some((row, mut target)) = next else { break };
+                simd::run(isa, tile::Row { frame: &frame, bins, row, scratch, target: &mut target });
+            }
+        });
+        bins.iter().for_each(|b| stats.add(&b.stats));
+        self.tiles[..threads].iter().for_each(|t| stats.add(&t.stats));
+        stats
+    }
+}
+
+/// Do every task, each on its own thread if there is more than one.
+fn each<T: Send>(tasks: Vec<T>, threads: usize, work: impl Fn(T) + Sync) {
+    if threads <= 1 {
+        return tasks.into_iter().for_each(work);
+    }
+    std::thread::scope(|s| {
+        for task in tasks {
+            s.spawn(|| work(task));
+        }
+    });
+}

@@ -1,0 +1,344 @@
+//! Triangles into tiles: eight at a time are culled and bounded; small ones become samples on the spot.
+
+use super::clip;
+use super::frame::{Class, Draw, Frame, ROTATED};
+use super::vertex::{OUTSIDE, Vertices};
+use super::{Stats, TILE};
+use crate::math::simd::{self, I8, Isa, Kernel};
+
+/// A sample of a small triangle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fragment {
+    /// Sample · 4096 + row in the tile · 64 + column.
+    pub place: u32,
+    pub z: f32,
+    pub id: u32,
+}
+
+/// A triangle on the picture plane, turned so that its area is positive (clockwise with y down).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Setup {
+    pub x: [i32; 3],
+    pub y: [i32; 3],
+    pub z: [f32; 3],
+    /// Triangle, counted over all draws.
+    pub id: u32,
+    pub draw: u32,
+}
+
+/// What one share of the triangles puts into the tiles.
+#[derive(Debug, Default)]
+pub(super) struct Bins {
+    pub setups: Vec<Setup>,
+    pub tiles: Vec<TileBin>,
+    pub stats: Stats,
+}
+
+#[derive(Debug, Default)]
+pub(super) struct TileBin {
+    pub fragments: Vec<Fragment>,
+    /// Indices of setups that are opaque or masked.
+    pub solid: Vec<u32>,
+    /// Indices of setups that let light through.
+    pub blend: Vec<u32>,
+}
+
+/// Triangles of at most so many pixels along each side become samples at once.
+const SMALL: i32 = 4;
+
+/// Differences up to here multiply within 32 bits.
+const SHORT: i32 = 1 << 14;
+
+/// Pixels, first and last, whose samples may lie within a triangle.
+#[derive(Clone, Copy)]
+pub(super) struct Bounds {
+    pub x: [i32; 2],
+    pub y: [i32; 2],
+}
+
+impl Bounds {
+    pub fn of(frame: &Frame, x: [i32; 3], y: [i32; 3]) -> Self {
+        let reach = reach(frame.samples);
+        let range = |v: [i32; 3], size: i32| {
+            let (lo, hi) = (v[0].min(v[1]).min(v[2]), v[0].max(v[1]).max(v[2]));
+            [((lo + 127 - reach) >> 8).max(0), ((hi - 128 + reach) >> 8).min(size - 1)]
+        };
+        Self { x: range(x, frame.width), y: range(y, frame.height) }
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.x[0] > self.x[1] || self.y[0] > self.y[1]
+    }
+}
+
+/// How far samples lie from their pixel's centre, in 1/256 pixels.
+#[inline(always)]
+fn reach(samples: usize) -> i32 {
+    if samples == 1 { 0 } else { 96 }
+}
+
+impl Bins {
+    /// Bin the `k`-th of `shares` equal parts of the triangle list.
+    pub fn fill(&mut self, isa: Isa, frame: &Frame, vertices: &Vertices, k: usize, shares: usize) {
+        self.clear(frame.tiles_x * frame.tiles_y);
+        let cut = |k: usize| (frame.triangle_count as u64 * k as u64 / shares as u64) as u32;
+        let (start, end) = (cut(k), cut(k + 1));
+        for (d, draw) in frame.draws.iter().enumerate() {
+            let last = draw.first_triangle + draw.object.mesh.triangles.len() as u32;
+            let (from, to) = (start.max(draw.first_triangle), end.min(last));
+            if from < to {
+                simd::run(isa, Share { bins: self, frame, vertices, draw, d: d as u32, from, to });
+            }
+        }
+        let s = &mut self.stats;
+        s.drawn = (end - start) as u64 - s.skipped - s.culled - s.missed;
+    }
+
+    fn clear(&mut self, tiles: usize) {
+        self.stats = Stats::default();
+        self.setups.clear();
+        self.tiles.resize_with(tiles, TileBin::default);
+        for t in &mut self.tiles {
+            t.fragments.clear();
+            t.solid.clear();
+            t.blend.clear();
+        }
+    }
+
+    /// Put a triangle into every tile that its bounds meet; false if there is none.
+    pub fn bin(&mut self, frame: &Frame, class: Class, setup: Setup) -> bool {
+        let b = Bounds::of(frame, setup.x, setup.y);
+        if b.is_empty() {
+            return false;
+        }
+        let index = self.setups.len() as u32;
+        self.setups.push(setup);
+        for ty in b.y[0] as usize / TILE..=b.y[1] as usize / TILE {
+            for tx in b.x[0] as usize / TILE..=b.x[1] as usize / TILE {
+                let tile = &mut self.tiles[ty * frame.tiles_x + tx];
+                if class == Class::Blend { &mut tile.blend } else { &mut tile.solid }.push(index);
+            }
+        }
+        true
+    }
+}
+
+/// Part of one draw.
+struct Share<'a> {
+    bins: &'a mut Bins,
+    frame: &'a Frame<'a>,
+    vertices: &'a Vertices,
+    draw: &'a Draw<'a>,
+    d: u32,
+    from: u32,
+    to: u32,
+}
+
+/// Eight triangles: coordinates of their three corners, and which lanes are still of interest.
+struct Group<'a> {
+    tris: &'a [[u32; 3]],
+    first: u32,
+    x: [I8; 3],
+    y: [I8; 3],
+    lo: [I8; 2],
+    hi: [I8; 2],
+}
+
+impl Kernel for Share<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(mut self) {
+        let first = self.draw.first_triangle;
+        let list = &self.draw.object.mesh.triangles[(self.from - first) as usize..(self.to - first) as usize];
+        let n = self.draw.object.positions.len();
+        let xy = &self.vertices.xy[self.draw.first_vertex..][..n];
+        let mut id = self.from;
+        for tris in list.chunks(8) {
+            self.group(tris, id, xy);
+            id += tris.len() as u32;
+        }
+    }
+}
+
+impl Share<'_> {
+    #[inline(always)]
+    fn group(&mut self, tris: &[[u32; 3]], first: u32, xy: &[[i32; 2]]) {
+        let (x, y) = corners(tris, xy);
+        let lanes = (1u32 << tris.len()) - 1;
+
+        // Lanes with a corner outside, or too long for 32-bit products, go one by one.
+        let (lo_x, hi_x) = (x[0].min(x[1]).min(x[2]), x[0].max(x[1]).max(x[2]));
+        let (lo_y, hi_y) = (y[0].min(y[1]).min(y[2]), y[0].max(y[1]).max(y[2]));
+        let outside = I8::splat(OUTSIDE + 1).gt(lo_x);
+        let short = I8::splat(SHORT);
+        let long = (hi_x - lo_x).gt(short) | (hi_y - lo_y).gt(short) | outside;
+        let slow = long.bitmask() & lanes;
+
+        // Cull the rest by area, then by bounds without a sample.
+        let area = (x[1] - x[0]) * (y[2] - y[0]) - (y[1] - y[0]) * (x[2] - x[0]);
+        let culled = match (self.draw.cull, self.draw.object.mirrored) {
+            (true, false) => I8::splat(0).gt(area),
+            (true, true) => area.gt(I8::ZERO),
+            (false, _) => !area.eq(I8::ZERO),
+        };
+        let culled = !culled.bitmask() & lanes & !slow;
+        let reach = reach(self.frame.samples);
+        let ends = |lo: I8, hi: I8, size: i32| {
+            let lo = (lo + I8::splat(127 - reach)).shr(8).max(I8::ZERO);
+            (lo, (hi + I8::splat(reach - 128)).shr(8).min(I8::splat(size - 1)))
+        };
+        let ((lo_x, hi_x), (lo_y, hi_y)) =
+            (ends(lo_x, hi_x, self.frame.width), ends(lo_y, hi_y, self.frame.height));
+        let empty = lo_x.gt(hi_x) | lo_y.gt(hi_y);
+        let missed = empty.bitmask() & lanes & !slow & !culled;
+        self.bins.stats.culled += culled.count_ones() as u64;
+        self.bins.stats.missed += missed.count_ones() as u64;
+
+        // What is left is drawn at once if it is small, binned if not.
+        let left = lanes & !slow & !culled & !missed;
+        let wide = (hi_x - lo_x).max(hi_y - lo_y).gt(I8::splat(SMALL - 1));
+        let direct = self.draw.class == Class::Opaque;
+        let large = if direct { wide.bitmask() & left } else { left };
+        let g = Group { tris, first, x, y, lo: [lo_x, lo_y], hi: [hi_x, hi_y] };
+        if left & !large != 0 {
+            self.small(&g, area, left & !large);
+        }
+        for k in bits(large) {
+            self.large(first + k, tris[k as usize]);
+        }
+        for k in bits(slow) {
+            self.large(first + k, tris[k as usize]);
+        }
+    }
+
+    /// Test every sample in the bounds of small triangles, a sample of all eight at a time.
+    #[inline(always)]
+    fn small(&mut self, g: &Group, area: I8, active: u32) {
+        // Turn all triangles the same way round.
+        let turn = I8::ZERO.gt(area);
+        let pick = |a: I8, b: I8| (turn.select_int(b, a), turn.select_int(a, b));
+        let ((x1, x2), (y1, y2)) = (pick(g.x[1], g.x[2]), pick(g.y[1], g.y[2]));
+        let (x, y) = ([g.x[0], x1, x2], [g.y[0], y1, y2]);
+
+        // Edge functions at the first pixel's centre, with the fill rule as a bias; steps of one pixel.
+        let px = g.lo[0].shl(8) + I8::splat(128);
+        let py = g.lo[1].shl(8) + I8::splat(128);
+        let (mut e, mut dx, mut dy, mut bias) = ([I8::ZERO; 3], [I8::ZERO; 3], [I8::ZERO; 3], [I8::ZERO; 3]);
+        for k in 0..3 {
+            let (a, b) = ([1, 2, 0][k], [2, 0, 1][k]);
+            (dx[k], dy[k]) = (x[b] - x[a], y[b] - y[a]);
+            let keep = I8::ZERO.gt(dy[k]) | (dy[k].eq(I8::ZERO) & dx[k].gt(I8::ZERO));
+            bias[k] = !keep;
+            e[k] = dx[k] * (py - y[a]) - dy[k] * (px - x[a]) + bias[k];
+        }
+        let (w, h) = (g.hi[0] - g.lo[0], g.hi[1] - g.lo[1]);
+        let area = turn.select_int(I8::ZERO - area, area);
+        for j in 0..SMALL {
+            let in_rows = active & !I8::splat(j).gt(h).bitmask();
+            if in_rows == 0 {
+                break;
+            }
+            for i in 0..SMALL {
+                let in_bounds = in_rows & !I8::splat(i).gt(w).bitmask();
+                if in_bounds == 0 {
+                    break;
+                }
+                for s in 0..self.frame.samples {
+                    let [sx, sy] = if self.frame.samples == 1 { [0, 0] } else { ROTATED[s] };
+                    let (ox, oy) = (I8::splat(256 * i + sx), I8::splat(256 * j + sy));
+                    let at = |k: usize| e[k] + dx[k] * oy - dy[k] * ox;
+                    let (e0, e1, e2) = (at(0), at(1), at(2));
+                    let hit = in_bounds & !(e0 | e1 | e2).bitmask();
+                    if hit != 0 {
+                        let b = [e1 - bias[1], e2 - bias[2]];
+                        self.emit(g, hit, b, area, turn, [i, j, s as i32]);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Hand the hit samples to their tiles.
+    #[inline(always)]
+    fn emit(&mut self, g: &Group, hit: u32, b: [I8; 2], area: I8, turn: I8, [i, j, s]: [i32; 3]) {
+        for k in bits(hit) {
+            let l = k as usize;
+            let t = g.tris[l];
+            let z = t.map(|v| self.vertices.z[self.draw.first_vertex + v as usize]);
+            let (z1, z2) = if turn.0[l] < 0 { (z[2], z[1]) } else { (z[1], z[2]) };
+            let scale = 1.0 / area.0[l] as f32;
+            let z =
+                z[0] + (z1 - z[0]) * (b[0].0[l] as f32 * scale) + (z2 - z[0]) * (b[1].0[l] as f32 * scale);
+            let (px, py) = ((g.lo[0].0[l] + i) as usize, (g.lo[1].0[l] + j) as usize);
+            let tile = &mut self.bins.tiles[py / TILE * self.frame.tiles_x + px / TILE];
+            let place = (s as usize * TILE * TILE + py % TILE * TILE + px % TILE) as u32;
+            tile.fragments.push(Fragment { place, z, id: g.first + k });
+        }
+    }
+
+    /// A triangle of any size and place, in 64 bits.
+    #[inline(never)]
+    fn large(&mut self, id: u32, t: [u32; 3]) {
+        let corner = t.map(|v| self.draw.first_vertex + v as usize);
+        let xy = corner.map(|v| self.vertices.xy[v]);
+        if xy.iter().any(|c| c[0] == OUTSIDE) {
+            let p = t.map(|v| self.draw.object.positions[v as usize]);
+            return clip::clipped(self.bins, self.frame, self.draw, self.d, id, p);
+        }
+        let z = corner.map(|v| self.vertices.z[v]);
+        match oriented(self.draw, xy.map(|c| c[0]), xy.map(|c| c[1]), z, id, self.d) {
+            None => self.bins.stats.culled += 1,
+            Some(setup) => {
+                let met = self.bins.bin(self.frame, self.draw.class, setup);
+                self.bins.stats.missed += !met as u64;
+            }
+        }
+    }
+}
+
+/// Turned to positive area; `None` if it is culled.
+pub(super) fn oriented(
+    draw: &Draw,
+    mut x: [i32; 3],
+    mut y: [i32; 3],
+    mut z: [f32; 3],
+    id: u32,
+    d: u32,
+) -> Option<Setup> {
+    let area = (x[1] - x[0]) as i64 * (y[2] - y[0]) as i64 - (y[1] - y[0]) as i64 * (x[2] - x[0]) as i64;
+    let front = if draw.object.mirrored { area > 0 } else { area < 0 };
+    if area == 0 || (draw.cull && !front) {
+        return None;
+    }
+    if area < 0 {
+        x.swap(1, 2);
+        y.swap(1, 2);
+        z.swap(1, 2);
+    }
+    Some(Setup { x, y, z, id, draw: d })
+}
+
+/// Corners of up to eight triangles, by lane.
+#[inline(always)]
+fn corners(tris: &[[u32; 3]], xy: &[[i32; 2]]) -> ([I8; 3], [I8; 3]) {
+    let (mut x, mut y) = ([I8::ZERO; 3], [I8::ZERO; 3]);
+    for (k, t) in tris.iter().enumerate().take(8) {
+        for c in 0..3 {
+            let v = xy[t[c] as usize];
+            x[c].0[k] = v[0];
+            y[c].0[k] = v[1];
+        }
+    }
+    (x, y)
+}
+
+/// The numbers of the bits that are set.
+#[inline(always)]
+pub(super) fn bits(mut mask: u32) -> impl Iterator<Item = u32> {
+    std::iter::from_fn(move || {
+        let k = mask.trailing_zeros();
+        mask &= mask.wrapping_sub(1);
+        (k < 32).then_some(k)
+    })
+}
