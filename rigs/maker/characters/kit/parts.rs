@@ -70,23 +70,31 @@ pub fn taper_box(x0: f64, x1: f64, start: [f64; 4], end: [f64; 4], bevel: f64) -
     for face in 0..3u32 {
         let (a, b) = (1 << ((face + 1) % 3), 1 << ((face + 2) % 3));
         let f = 1 << face;
-        // The face itself, both ends, wound outwards.
-        quad([v(0, face), v(b, face), v(a + b, face), v(a, face)]);
+        // The face itself, both ends.
+        quad([v(0, face), v(a, face), v(a + b, face), v(b, face)]);
         quad([v(f, face), v(f + a, face), v(f + a + b, face), v(f + b, face)]);
         // The four bevels along this axis lie between the two other faces.
         let (fa, fb) = ((face + 1) % 3, (face + 2) % 3);
-        for (i, (ca, cb)) in [(0, 0), (a, 0), (a, b), (0, b)].into_iter().enumerate() {
-            let c = ca + cb;
-            let q = [v(c, fa), v(c, fb), v(c + f, fb), v(c + f, fa)];
-            quad(if i % 2 == 0 { [q[3], q[2], q[1], q[0]] } else { q });
+        for c in [0, a, b, a + b] {
+            quad([v(c, fa), v(c, fb), v(c + f, fb), v(c + f, fa)]);
         }
     }
     for corner in 0..8u32 {
-        let odd = corner.count_ones() % 2 == 1;
-        let t = [v(corner, 0), v(corner, 1), v(corner, 2)];
-        s.triangles.push(if odd { t } else { [t[0], t[2], t[1]] });
+        s.triangles.push([v(corner, 0), v(corner, 1), v(corner, 2)]);
     }
+    outwards(&mut s);
     s
+}
+
+/// Wind the triangles of a convex solid so that they face outwards.
+fn outwards(s: &mut Solid) {
+    let middle = s.positions.iter().sum::<DVec3>() / s.positions.len() as f64;
+    for t in &mut s.triangles {
+        let [a, b, c] = t.map(|i| s.positions[i as usize]);
+        if (b - a).cross(c - a).dot(a - middle) < 0.0 {
+            t.swap(1, 2);
+        }
+    }
 }
 
 /// A profile of `(x, radius)` turned about the x axis; it begins and ends on the axis.
