@@ -1,0 +1,17 @@
+//! The shipped characters. Each is a function from nothing to files.
+
+mod kit;
+mod robot_arm;
+
+/// A file to be written.
+pub struct File {
+    /// From the root of the repository.
+    pub path: String,
+    /// All of it.
+    pub bytes: Vec<u8>,
+}
+
+/// Every file in `rigs/` and `poses/` that the maker builds.
+pub fn all() -> Vec<File> {
+    [robot_arm::files()].into_iter().flatten().collect()
+}
