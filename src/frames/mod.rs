@@ -45,7 +45,7 @@ pub struct FrameStats {
 
 impl<'a> Shot<'a> {
     /// Set up a shot of `clip` (rest for `None`). With [`View::Orbit`] the camera stands so that no vertex leaves the picture
-    /// at [`Framing::MOMENTS`] moments spread over the whole clip, whichever frames are drawn later.
+    /// at up to [`Framing::MOMENTS`] moments spread over the whole clip, whichever frames are drawn later.
     ///
     /// `background` is linear RGBA, alpha premultiplied.
     ///
@@ -153,14 +153,17 @@ impl<'a> Shot<'a> {
 /// Widen `framing` until it holds the whole clip.
 fn fit(asset: &Asset, clip: Option<usize>, center: DVec3, worker: &mut Worker, framing: &mut Framing) {
     let range = clip.map(|c| asset.character.clips()[c].playback()).unwrap_or_default();
-    let moments = if range.duration() > 0.0 { Framing::MOMENTS } else { 1 };
+    // A moment each 24th of a second, both ends included; long clips are looked at more thinly.
+    let moments = (range.duration() * 24.0).clamp(0.0, (Framing::MOMENTS - 1) as f64).ceil() as usize + 1;
+    let mut positions = Vec::new();
     for k in 0..moments {
         let t = range.start + range.duration() * k as f64 / (moments - 1).max(1) as f64;
         worker.evaluate(asset, clip, t);
-        worker.deform(asset, center);
-        for (deformed, inst) in worker.deformed.iter().zip(asset.character.instances()) {
+        for (i, inst) in asset.character.instances().iter().enumerate() {
             if !asset.character.mesh(inst).triangles.is_empty() {
-                framing.include(&deformed.positions);
+                let Worker { pose, posed, scratch, .. } = worker;
+                asset.character.positions(i, pose, posed, center, scratch, &mut positions);
+                framing.include(&positions);
             }
         }
     }

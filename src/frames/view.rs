@@ -45,7 +45,7 @@ pub struct Framing {
 }
 
 impl Framing {
-    /// Moments of a clip at which vertices are looked at.
+    /// Most moments of a clip at which vertices are looked at: each 24th of a second of the first four seconds' worth.
     pub const MOMENTS: usize = 97;
     /// Share of the picture, from its middle to its edge, that the character may fill.
     const FILL: f32 = 0.92;

@@ -101,7 +101,10 @@ pub fn import(path: &std::path::Path, options: &Options) -> Result<Import, Impor
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     match probe(&bytes, &name) {
         Format::Notes => Ok(notes::import_bytes(&bytes, folder, options)?),
-        Format::Gltf => Ok(gltf::import(path, options)?),
+        Format::Gltf => {
+            let folder = if folder.as_os_str().is_empty() { std::path::Path::new(".") } else { folder };
+            Ok(gltf::import_bytes(&bytes, Some(folder), &path.display().to_string(), options)?)
+        }
         Format::Rig => Ok(rig_json::import(path, options)?),
         Format::Unknown(why) => Err(ImportError::Unknown(why)),
     }
