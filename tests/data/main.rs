@@ -2,6 +2,7 @@
 //!
 //! Without the files every test here is reported as ignored; with `SINEW_DATA` set to a missing folder the run fails.
 
+mod gltf_mutations;
 mod gltf_oracle;
 mod invalid;
 mod sha256;
@@ -23,5 +24,8 @@ fn main() {
 type Test = fn(&std::path::Path) -> Result<(), String>;
 
 /// Name and body of every test.
-const TESTS: &[(&str, Test)] =
-    &[("gltf_agrees_with_the_oracle", gltf_oracle::run), ("broken_files_are_refused_politely", invalid::run)];
+const TESTS: &[(&str, Test)] = &[
+    ("gltf_agrees_with_the_oracle", gltf_oracle::run),
+    ("changed_bytes_never_panic", gltf_mutations::run),
+    ("broken_files_are_refused_politely", invalid::run),
+];

@@ -30,8 +30,13 @@ pub enum GltfError {
         found: String,
     },
     /// JSON that cannot be parsed, or does not have glTF's shape.
-    #[error("the JSON is no glTF 2.0: {0}")]
-    Json(#[from] serde_json::Error),
+    #[error("{place}: the JSON is no glTF 2.0: {source}")]
+    Json {
+        /// The entry that does not fit, or `JSON`.
+        place: String,
+        /// What the parser says.
+        source: serde_json::Error,
+    },
     /// Another generation of the format.
     #[error(
         "{place}: expected glTF 2.x, found `{found}`; convert the file first (for 1.0: `gltf-pipeline -i in -o out`)"
