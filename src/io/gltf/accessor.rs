@@ -92,7 +92,8 @@ impl Document<'_> {
         let unsigned = [ComponentType::U8, ComponentType::U16, ComponentType::U32];
         // Floats that hold whole numbers were written by early exporters for joints.
         let found = layout.component;
-        if !unsigned.contains(&found) && !(found == ComponentType::F32 && shapes != [Type::Scalar]) {
+        let whole_floats = found == ComponentType::F32 && shapes != [Type::Scalar];
+        if !unsigned.contains(&found) && !whole_floats {
             return Err(value(
                 format!("accessors[{index}].componentType"),
                 "an unsigned integer type",

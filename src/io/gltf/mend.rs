@@ -8,6 +8,14 @@ use serde_json::{Map, Value, json};
 
 /// Parse, check the version, mend, and give the JSON its types.
 pub(super) fn root(text: &[u8], warnings: &mut Warnings) -> Result<Root> {
+    serde_json::from_value(mended(text, warnings)?).or_else(|source| {
+        // Read it again to find the misfit: keeping both forms would double the memory of every good file.
+        let value = mended(text, &mut Warnings::default())?;
+        Err(misfit(&value).unwrap_or(GltfError::Json { place: "JSON".into(), source }))
+    })
+}
+
+fn mended(text: &[u8], warnings: &mut Warnings) -> Result<Value> {
     let syntax = |source| GltfError::Json { place: "JSON".into(), source };
     let mut value: Value = serde_json::from_slice(trim_padding(text)).map_err(syntax)?;
     version(&mut value, warnings)?;
@@ -15,10 +23,7 @@ pub(super) fn root(text: &[u8], warnings: &mut Warnings) -> Result<Root> {
     optional_lists(&mut value);
     texture_sources(&mut value);
     channels_without_node(&mut value, warnings);
-    match Root::deserialize(&value) {
-        Ok(root) => Ok(root),
-        Err(source) => Err(misfit(&value).unwrap_or_else(|| syntax(source))),
-    }
+    Ok(value)
 }
 
 /// Which entry of which list does not have the schema's shape.
