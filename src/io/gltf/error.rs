@@ -20,8 +20,10 @@ pub enum GltfError {
         source: std::io::Error,
     },
     /// Bytes that are neither GLB nor JSON, or a GLB whose lengths do not hold.
-    #[error("byte {offset}: expected {expected}, found {found}; the file is damaged or no glTF")]
+    #[error("`{file}`, byte {offset}: expected {expected}, found {found}; the file is damaged or no glTF")]
     Container {
+        /// What the caller calls the file.
+        file: String,
         /// Where in the file.
         offset: u64,
         /// What should be there.
