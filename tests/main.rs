@@ -4,6 +4,8 @@ mod architecture;
 #[cfg(feature = "cli")]
 mod cli;
 mod deform;
+#[cfg(feature = "io")]
+mod gltf;
 #[cfg(feature = "pictures")]
 mod picture;
 mod rng;

@@ -79,7 +79,7 @@ impl Document<'_> {
             ComponentType::F32 => f32::from_le_bytes([b[0], b[1], b[2], b[3]]),
         };
         let mut out = self.read(index, accessor, &layout, place, convert)?;
-        if accessor.normalized {
+        if accessor.normalized && layout.component != ComponentType::F32 {
             // The most negative integer means −1 as well.
             out.values.iter_mut().for_each(|v| *v = v.max(-1.0));
         }
@@ -92,7 +92,8 @@ impl Document<'_> {
         let unsigned = [ComponentType::U8, ComponentType::U16, ComponentType::U32];
         // Floats that hold whole numbers were written by early exporters for joints.
         let found = layout.component;
-        if !unsigned.contains(&found) && !(found == ComponentType::F32 && shapes != [Type::Scalar]) {
+        let whole_floats = found == ComponentType::F32 && shapes != [Type::Scalar];
+        if !unsigned.contains(&found) && !whole_floats {
             return Err(value(
                 format!("accessors[{index}].componentType"),
                 "an unsigned integer type",
@@ -128,7 +129,9 @@ impl Document<'_> {
             return Err(value(at("type"), "SCALAR, VEC2, VEC3, VEC4, MAT2, MAT3 or MAT4", "another word"));
         };
         if !shapes.contains(&shape) {
-            return Err(value(at("type"), format!("{shapes:?} for {place}"), format!("{shape:?}")));
+            let wanted: Vec<&str> = shapes.iter().map(|s| word(*s)).collect();
+            let expected = format!("{} for {place}", wanted.join(" or "));
+            return Err(value(at("type"), expected, word(shape)));
         }
         Ok((accessor, Layout::new(component.0, shape)))
     }
@@ -252,5 +255,18 @@ fn unit(component: ComponentType) -> f32 {
         ComponentType::U16 => 65535.0,
         ComponentType::U32 => 4_294_967_295.0,
         ComponentType::F32 => 1.0,
+    }
+}
+
+/// A shape as the file spells it.
+fn word(shape: Type) -> &'static str {
+    match shape {
+        Type::Scalar => "SCALAR",
+        Type::Vec2 => "VEC2",
+        Type::Vec3 => "VEC3",
+        Type::Vec4 => "VEC4",
+        Type::Mat2 => "MAT2",
+        Type::Mat3 => "MAT3",
+        Type::Mat4 => "MAT4",
     }
 }

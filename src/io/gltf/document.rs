@@ -9,7 +9,7 @@ use std::cell::{Cell, OnceCell};
 use std::path::Path;
 
 /// Decoded data that any file may ask for.
-const FREE_BYTES: u64 = 256 << 20;
+const FREE_BYTES: u64 = 128 << 20;
 /// Decoded data allowed for each byte of the file: packed vertices take two bytes each, and primitives share accessors.
 const BYTES_A_BYTE: u64 = 32;
 
@@ -25,13 +25,14 @@ pub(super) struct Document<'a> {
 
 impl<'a> Document<'a> {
     /// Load the buffers: the binary chunk, embedded data, files beside the asset.
-    pub fn new(root: Root, bin: Option<&'a [u8]>, base: Option<&Path>, w: &mut Warnings) -> Result<Self> {
+    pub fn new(mut root: Root, bin: Option<&'a [u8]>, base: Option<&Path>, w: &mut Warnings) -> Result<Self> {
         let mut buffers = Vec::with_capacity(root.buffers.len());
-        for (i, b) in root.buffers.iter().enumerate() {
+        for (i, b) in root.buffers.iter_mut().enumerate() {
             let place = format!("buffers[{i}]");
-            let bytes = match &b.uri {
+            // Embedded data are not kept twice.
+            let bytes = match b.uri.take() {
                 _ if compressed::is_fallback(b) => None,
-                Some(u) => Some(Cow::Owned(uri::load(u, base, &format!("{place}.uri"))?)),
+                Some(u) => Some(Cow::Owned(uri::load(&u, base, &format!("{place}.uri"))?)),
                 None => bin.filter(|_| i == 0).map(Cow::Borrowed),
             };
             if let Some(found) = bytes.as_ref().map(|b| b.len() as u64).filter(|&n| n < b.byte_length.0) {

@@ -20,8 +20,10 @@ pub enum GltfError {
         source: std::io::Error,
     },
     /// Bytes that are neither GLB nor JSON, or a GLB whose lengths do not hold.
-    #[error("byte {offset}: expected {expected}, found {found}; the file is damaged or no glTF")]
+    #[error("`{file}`, byte {offset}: expected {expected}, found {found}; the file is damaged or no glTF")]
     Container {
+        /// What the caller calls the file.
+        file: String,
         /// Where in the file.
         offset: u64,
         /// What should be there.
@@ -30,8 +32,13 @@ pub enum GltfError {
         found: String,
     },
     /// JSON that cannot be parsed, or does not have glTF's shape.
-    #[error("the JSON is no glTF 2.0: {0}")]
-    Json(#[from] serde_json::Error),
+    #[error("{place}: the JSON is no glTF 2.0: {source}")]
+    Json {
+        /// The entry that does not fit, or `JSON`.
+        place: String,
+        /// What the parser says.
+        source: serde_json::Error,
+    },
     /// Another generation of the format.
     #[error(
         "{place}: expected glTF 2.x, found `{found}`; convert the file first (for 1.0: `gltf-pipeline -i in -o out`)"

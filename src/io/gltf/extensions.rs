@@ -24,18 +24,9 @@ const LOOK: &[&str] = &[
     "EXT_lights_image_based",
     "EXT_texture_avif",
     "KHR_animation_pointer",
-    "KHR_materials_anisotropy",
-    "KHR_materials_clearcoat",
-    "KHR_materials_diffuse_transmission",
-    "KHR_materials_dispersion",
-    "KHR_materials_ior",
-    "KHR_materials_iridescence",
-    "KHR_materials_sheen",
-    "KHR_materials_specular",
-    "KHR_materials_transmission",
-    "KHR_materials_variants",
-    "KHR_materials_volume",
-    "KHR_materials_volume_scatter",
+    "KHR_node_hoverability",
+    "KHR_node_selectability",
+    "KHR_node_visibility",
     "KHR_texture_basisu",
     "KHR_xmp",
     "KHR_xmp_json_ld",
@@ -44,7 +35,8 @@ const LOOK: &[&str] = &[
 
 /// Refuse what is required and unknown; warn of what is left out.
 pub(super) fn check(root: &Root, w: &mut Warnings) -> Result<()> {
-    let known = |name: &str| READ.contains(&name) || LOOK.contains(&name);
+    let look = |name: &str| LOOK.contains(&name) || name.starts_with("KHR_materials_");
+    let known = |name: &str| READ.contains(&name) || look(name);
     if let Some(name) = root.extensions_required.iter().find(|n| !known(n)) {
         return Err(GltfError::Extension { name: name.clone(), hint: hint(name) });
     }
@@ -52,9 +44,11 @@ pub(super) fn check(root: &Root, w: &mut Warnings) -> Result<()> {
     named.sort();
     named.dedup();
     for name in named {
-        if LOOK.contains(&name.as_str()) {
+        if READ.contains(&name.as_str()) {
+            continue;
+        } else if look(name) {
             w.push("extensionsUsed", format!("`{name}` is left out or approximated; only the look differs"));
-        } else if !known(name) {
+        } else {
             w.push("extensionsUsed", format!("`{name}` is unknown and ignored"));
         }
     }

@@ -48,6 +48,7 @@ struct Built {
 pub(super) fn build(doc: &Document, nodes: &Nodes, w: &mut Warnings) -> Result<Geometry> {
     let mut out = Geometry::default();
     let mut skins = skins::Skins::default();
+    let mut shown = vec![false; doc.root.meshes.len()];
     for &node in &nodes.in_scene {
         let json = &doc.root.nodes[node];
         let Some(mesh) = json.mesh else {
@@ -58,7 +59,11 @@ pub(super) fn build(doc: &Document, nodes: &Nodes, w: &mut Warnings) -> Result<G
         };
         let mesh = mesh.value();
         entry(&doc.root.meshes, mesh, "mesh", || format!("nodes[{node}].mesh"))?;
+        shown[mesh] = true;
         out.node(doc, nodes, &mut skins, node, mesh, w)?;
+    }
+    for (i, _) in doc.root.meshes.iter().enumerate().filter(|(i, _)| !shown[*i]) {
+        w.push(format!("meshes[{i}]"), "no node of the scene shows it; left out");
     }
     Ok(out)
 }
@@ -90,6 +95,7 @@ impl Geometry {
                     Binding::Bone(bone(nodes, node, || place.clone())?)
                 }
             };
+            doc.charge(256, &place)?;
             self.instances.push(Instance { mesh: built.mesh, binding, first_weight: run });
             self.sources.push(PrimitiveSource { node: node as u32, mesh: mesh as u32, primitive: p as u32 });
         }
@@ -113,6 +119,7 @@ impl Geometry {
         if let Some(k) = given.iter().take(count).position(|x| !x.is_finite()) {
             return Err(value(format!("nodes[{node}].weights[{k}]"), "a finite number", "infinity"));
         }
+        doc.charge(count as u64 * 4, &format!("nodes[{node}].weights"))?;
         let first = self.rest_weights.len();
         self.rest_weights.extend((0..count).map(|k| given.get(k).copied().unwrap_or(0.0)));
         self.runs.0.insert(node, (first, count));

@@ -2,18 +2,52 @@
 
 use super::error::{GltfError, Result};
 use super::warnings::Warnings;
-use ::gltf::json::Root;
+use ::gltf::json::{self, Root};
+use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
 /// Parse, check the version, mend, and give the JSON its types.
 pub(super) fn root(text: &[u8], warnings: &mut Warnings) -> Result<Root> {
-    let mut value: Value = serde_json::from_slice(trim_padding(text))?;
+    serde_json::from_value(mended(text, warnings)?).or_else(|source| {
+        // Read it again to find the misfit: keeping both forms would double the memory of every good file.
+        let value = mended(text, &mut Warnings::default())?;
+        Err(misfit(&value).unwrap_or(GltfError::Json { place: "JSON".into(), source }))
+    })
+}
+
+fn mended(text: &[u8], warnings: &mut Warnings) -> Result<Value> {
+    let syntax = |source| GltfError::Json { place: "JSON".into(), source };
+    let mut value: Value = serde_json::from_slice(trim_padding(text)).map_err(syntax)?;
     version(&mut value, warnings)?;
     strip_extras(&mut value);
     optional_lists(&mut value);
     texture_sources(&mut value);
     channels_without_node(&mut value, warnings);
-    Ok(serde_json::from_value(value)?)
+    Ok(value)
+}
+
+/// Which entry of which list does not have the schema's shape.
+fn misfit(value: &Value) -> Option<GltfError> {
+    fn first<T: for<'a> Deserialize<'a>>(value: &Value, key: &str) -> Option<GltfError> {
+        let list = value.get(key)?.as_array()?;
+        list.iter().enumerate().find_map(|(i, v)| {
+            let source = T::deserialize(v).err()?;
+            Some(GltfError::Json { place: format!("{key}[{i}]"), source })
+        })
+    }
+    None.or_else(|| first::<json::Accessor>(value, "accessors"))
+        .or_else(|| first::<json::Animation>(value, "animations"))
+        .or_else(|| first::<json::Buffer>(value, "buffers"))
+        .or_else(|| first::<json::buffer::View>(value, "bufferViews"))
+        .or_else(|| first::<json::Camera>(value, "cameras"))
+        .or_else(|| first::<json::Image>(value, "images"))
+        .or_else(|| first::<json::Material>(value, "materials"))
+        .or_else(|| first::<json::Mesh>(value, "meshes"))
+        .or_else(|| first::<json::Node>(value, "nodes"))
+        .or_else(|| first::<json::texture::Sampler>(value, "samplers"))
+        .or_else(|| first::<json::Scene>(value, "scenes"))
+        .or_else(|| first::<json::Skin>(value, "skins"))
+        .or_else(|| first::<json::Texture>(value, "textures"))
 }
 
 /// GLB pads its JSON with spaces; some writers pad with zeros.

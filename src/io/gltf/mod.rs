@@ -37,6 +37,16 @@ use warnings::Warnings;
 
 /// Read a `.gltf` or `.glb` file, told apart by content, and the buffers and pictures beside it.
 ///
+/// ```
+/// use sinew::io::{Options, gltf};
+/// let text = br#"{ "asset": { "version": "2.0" }, "nodes": [{ "name": "hip" }, { "name": "hip" }] }"#;
+/// let import = gltf::import_bytes(text, None, "two-hips.gltf", &Options::default()).unwrap();
+/// assert_eq!(import.asset.character.skeleton().len(), 2);
+/// assert!(import.warnings[0].to_string().starts_with("nodes[1].name: "));
+/// let e = gltf::import_bytes(b"glTF", None, "cut.glb", &Options::default()).unwrap_err();
+/// assert!(e.to_string().starts_with("`cut.glb`, byte 4: expected a GLB version"));
+/// ```
+///
 /// # Errors
 /// [`GltfError`], with the place in the file, what was expected and what was found.
 pub fn import(path: &Path, options: &Options) -> std::result::Result<Import, GltfError> {
@@ -50,7 +60,7 @@ pub fn import(path: &Path, options: &Options) -> std::result::Result<Import, Glt
     import_bytes(&bytes, folder, &file(), options)
 }
 
-/// Read a file's bytes. `base_dir` is where its relative URIs are looked up; without one they are errors.
+/// Read a file's bytes; `name` is what messages call it. `base_dir` is where its relative URIs are looked up; without one they are errors.
 ///
 /// # Errors
 /// [`GltfError`], with the place in the file, what was expected and what was found.
@@ -60,9 +70,8 @@ pub fn import_bytes(
     name: &str,
     options: &Options,
 ) -> std::result::Result<Import, GltfError> {
-    let _ = name;
     let mut w = Warnings::default();
-    let parts = container::split(bytes)?;
+    let parts = container::split(bytes, name)?;
     let root = mend::root(parts.json, &mut w)?;
     extensions::check(&root, &mut w)?;
     let doc = Document::new(root, parts.bin, base_dir, &mut w)?;

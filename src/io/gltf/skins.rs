@@ -13,6 +13,7 @@ use ::gltf::json::accessor::Type;
 use ::gltf::json::mesh::Semantic;
 use glam::Affine3A;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 type Palette = Vec<(BoneId, Affine3A)>;
 
@@ -32,11 +33,10 @@ impl Skins {
         place: &str,
         w: &mut Warnings,
     ) -> Result<Binding> {
-        if !self.0.contains_key(&skin) {
-            let place = format!("nodes[{node}].skin");
-            self.0.insert(skin, palette(doc, nodes, skin, &place, w)?);
-        }
-        let palette = &self.0[&skin];
+        let palette = match self.0.entry(skin) {
+            Entry::Occupied(done) => done.into_mut(),
+            Entry::Vacant(slot) => slot.insert(palette(doc, nodes, skin, &format!("nodes[{node}].skin"), w)?),
+        };
         let Influences { per_vertex, joints, weights } = influences;
         if joints.len() != count * per_vertex {
             let expected = format!("joints and weights for {count} vertices");
