@@ -164,7 +164,7 @@ impl F8 {
 
     /// Mask of `self = other`.
     #[inline(always)]
-    pub fn eq(self, other: Self) -> I8 {
+    pub fn equal(self, other: Self) -> I8 {
         I8(lanes!(i => -((self.0[i] == other.0[i]) as i32)))
     }
 
@@ -234,7 +234,7 @@ impl I8 {
 
     /// Mask of `self = other`.
     #[inline(always)]
-    pub fn eq(self, other: Self) -> I8 {
+    pub fn equal(self, other: Self) -> I8 {
         I8(lanes!(i => -((self.0[i] == other.0[i]) as i32)))
     }
 

@@ -1,5 +1,7 @@
 //! Scenes to pictures.
 
+mod material;
+mod sample;
 mod shade;
 
 pub mod raster;

@@ -32,7 +32,7 @@ pub(super) fn id_bands(out: &mut IdImage) -> Vec<Target<'_>> {
 }
 
 /// Four planes of linear, premultiplied colour: row in the tile · 64 + column.
-pub(super) type Planes = [Vec<f32>; 4];
+type Planes = [Vec<f32>; 4];
 
 impl Target<'_> {
     /// Rows of the picture in this band.
@@ -59,7 +59,8 @@ impl Target<'_> {
                 for y in 0..rows {
                     let row = &mut pixels[y * *width + x..][..w];
                     for (i, p) in row.iter_mut().enumerate() {
-                        *p = [0, 1, 2, 3].map(|c| planes[c][y * TILE + i]);
+                        let at = y * TILE + i;
+                        *p = [planes[0][at], planes[1][at], planes[2][at], planes[3][at]];
                     }
                 }
             }
@@ -116,7 +117,8 @@ impl Target<'_> {
 fn encode_row(row: &mut [u8], planes: &Planes, start: usize) {
     for (k, out) in row.chunks_mut(32).enumerate() {
         let at = start + 8 * k;
-        let c = [0, 1, 2, 3].map(|c| F8::load(&planes[c][at..]));
+        let load = |c: usize| F8::load(&planes[c][at..]);
+        let c = [load(0), load(1), load(2), load(3)];
         let words = encode8(c);
         for (bytes, word) in out.as_chunks_mut::<4>().0.iter_mut().zip(words.0) {
             *bytes = (word as u32).to_le_bytes();
@@ -128,7 +130,7 @@ fn encode_row(row: &mut [u8], planes: &Planes, start: usize) {
 #[inline(always)]
 fn encode8(c: [F8; 4]) -> I8 {
     let opaque = c[3].ge(F8::ONE);
-    let clear = I8::ZERO.eq(c[3].to_bits());
+    let clear = I8::ZERO.equal(c[3].to_bits());
     if (opaque | clear).bitmask() == 0xff {
         let (r, g, b) = (codes(c[0]), codes(c[1]), codes(c[2]));
         return opaque & (r | g.shl(8) | b.shl(16) | I8::splat(0xff << 24));
@@ -156,8 +158,8 @@ fn codes(c: F8) -> I8 {
     let doubt = off.max(F8::ZERO - off).gt(F8::splat(0.5 - DOUBT)).bitmask();
     let mut out = rounded;
     if doubt != 0 {
-        for k in 0..8 {
-            out.0[k] = color::srgb8(c.0[k]) as i32;
+        for k in super::setup::bits(doubt) {
+            out.0[k as usize] = color::srgb8(c.0[k as usize]) as i32;
         }
     }
     out

@@ -37,6 +37,8 @@ pub(super) struct Walk {
     z: [f32; 4],
     z_x: f32,
     z_y: f32,
+    /// At the first pixel's centre.
+    z_center: f32,
     z_lo: f32,
     z_hi: f32,
     pub id: u32,
@@ -61,6 +63,7 @@ impl Walk {
             z: [0.0; 4],
             z_x: 0.0,
             z_y: 0.0,
+            z_center: 0.0,
             z_lo: s.z[0].min(s.z[1]).min(s.z[2]),
             z_hi: s.z[0].max(s.z[1]).max(s.z[2]),
             id: s.id,
@@ -105,11 +108,14 @@ impl Walk {
         let scale = 1.0 / (x1 * y2 - y1 * x2);
         let (zx, zy) = ((z1 * y2 - z2 * y1) * scale, (z2 * x1 - z1 * x2) * scale);
         (self.z_x, self.z_y) = ((zx * 256.0) as f32, (zy * 256.0) as f32);
-        for n in 0..frame.samples {
-            let o = sample_offset(frame.samples, n);
+        let at = |o: [i32; 2]| {
             let px = (tile[0] * 256 + 128 + o[0] - s.x[0]) as f64;
             let py = (tile[1] * 256 + 128 + o[1] - s.y[0]) as f64;
-            self.z[n] = (s.z[0] as f64 + zx * px + zy * py) as f32;
+            (s.z[0] as f64 + zx * px + zy * py) as f32
+        };
+        self.z_center = at([0, 0]);
+        for n in 0..frame.samples {
+            self.z[n] = at(sample_offset(frame.samples, n));
         }
     }
 
@@ -138,20 +144,36 @@ impl Walk {
         }
     }
 
-    /// Draw into the buffer: nearer wins, at equal depth the triangle that was submitted first.
+    /// Draw into the buffer: nearer wins, at equal depth the triangle that was submitted first. `keep` may take lanes
+    /// away: it is given the first pixel, the sample's offset in pixels and the lanes that would win.
     #[inline(always)]
-    pub fn fill(&self, samples: usize, v: &mut Visibility) {
+    pub fn fill(&self, samples: usize, v: &mut Visibility, keep: impl Fn(usize, [f32; 2], I8) -> I8) {
         let id = I8::splat(self.id as i32);
-        self.visit(samples, |at, n, inside, z| {
-            let at = n * TILE * TILE + at;
+        self.visit(samples, |first, n, inside, z| {
+            let at = n * TILE * TILE + first;
             let zs: &mut [f32; 8] = (&mut v.z[at..at + 8]).try_into().expect("eight");
             let ids: &mut [u32; 8] = (&mut v.id[at..at + 8]).try_into().expect("eight");
-            let (old_z, old_id) = (F8(*zs), I8(ids.map(|i| i as i32)));
-            let earlier = before(id, old_id);
-            let wins = inside & (z.gt(old_z) | (z.eq(old_z) & earlier));
+            let (old_z, mut old_id) = (F8(*zs), I8::ZERO);
+            for k in 0..8 {
+                old_id.0[k] = ids[k] as i32;
+            }
+            let wins = inside & (z.gt(old_z) | (z.equal(old_z) & before(id, old_id)));
+            if !wins.any() {
+                return;
+            }
+            let o = sample_offset(samples, n);
+            let wins = keep(first, [o[0] as f32 / 256.0, o[1] as f32 / 256.0], wins);
             *zs = wins.select(z, old_z).0;
-            *ids = wins.select_int(id, old_id).0.map(|i| i as u32);
+            let new = wins.select_int(id, old_id);
+            for k in 0..8 {
+                ids[k] = new.0[k] as u32;
+            }
         });
+    }
+
+    /// Depth at a pixel's centre in the tile.
+    pub fn depth_at(&self, x: i32, y: i32) -> f32 {
+        (self.z_center + self.z_x * x as f32 + self.z_y * y as f32).max(self.z_lo).min(self.z_hi)
     }
 }
 

@@ -1,7 +1,7 @@
 //! What every stage reads: the picture's geometry and the objects that can be drawn.
 
 use super::Stats;
-use crate::math::simd::{F8, V8};
+use crate::math::simd::{F8, Isa, V8};
 use crate::render::Settings;
 use crate::scene::{AlphaMode, Material, Object, Projection, Scene};
 use glam::{Vec3, Vec4};
@@ -42,6 +42,7 @@ pub(super) struct Projector {
 }
 
 pub(super) struct Frame<'a> {
+    pub isa: Isa,
     pub scene: &'a Scene<'a>,
     pub draws: Vec<Draw<'a>>,
     pub project: Projector,
@@ -57,14 +58,23 @@ pub(super) struct Frame<'a> {
 
 static FALLBACK: std::sync::LazyLock<Material> = std::sync::LazyLock::new(Material::default);
 
+impl Draw<'_> {
+    /// Numbers of its triangles.
+    #[inline(always)]
+    pub fn ids(&self) -> std::ops::Range<u32> {
+        self.first_triangle..self.first_triangle + self.object.mesh.triangles.len() as u32
+    }
+}
+
 impl<'a> Frame<'a> {
-    pub fn new(scene: &'a Scene<'a>, settings: &Settings) -> Self {
+    pub fn new(isa: Isa, scene: &'a Scene<'a>, settings: &Settings) -> Self {
         let (w, h) = (settings.width, settings.height);
         let clip = scene.camera.clip_from_scene(w as f32 / h.max(1) as f32);
         let (half_w, half_h) = (w as f32 * 0.5, h as f32 * 0.5);
         let project =
             Projector { x: clip.row(0) * half_w, y: clip.row(1) * -half_h, z: clip.row(2), w: clip.row(3) };
         let mut frame = Self {
+            isa,
             scene,
             draws: Vec::with_capacity(scene.objects.len()),
             project,

@@ -8,6 +8,7 @@
 //! Samples are decided in integers and ties by the order of submission, so the picture does not depend on the number of
 //! threads, on the machine, or on the order in which tiles are drawn.
 
+mod blend;
 mod clip;
 mod encode;
 mod fill;
@@ -159,7 +160,7 @@ impl Rasterizer {
     /// All stages; `bands` are the rows of tiles of the output.
     fn paint(&mut self, scene: &Scene, settings: &Settings, bands: Vec<Target>) -> Stats {
         settings.check().expect("settings are checked by the caller");
-        let frame = Frame::new(scene, settings);
+        let frame = Frame::new(self.isa, scene, settings);
         let threads = settings.threads.max(1);
         let mut stats = frame.stats;
         if bands.is_empty() {

@@ -180,7 +180,7 @@ impl Share<'_> {
         let culled = match (self.draw.cull, self.draw.object.mirrored) {
             (true, false) => I8::splat(0).gt(area),
             (true, true) => area.gt(I8::ZERO),
-            (false, _) => !area.eq(I8::ZERO),
+            (false, _) => !area.equal(I8::ZERO),
         };
         let culled = !culled.bitmask() & lanes & !slow;
         let reach = reach(self.frame.samples);
@@ -228,7 +228,7 @@ impl Share<'_> {
         for k in 0..3 {
             let (a, b) = ([1, 2, 0][k], [2, 0, 1][k]);
             (dx[k], dy[k]) = (x[b] - x[a], y[b] - y[a]);
-            let keep = I8::ZERO.gt(dy[k]) | (dy[k].eq(I8::ZERO) & dx[k].gt(I8::ZERO));
+            let keep = I8::ZERO.gt(dy[k]) | (dy[k].equal(I8::ZERO) & dx[k].gt(I8::ZERO));
             bias[k] = !keep;
             e[k] = dx[k] * (py - y[a]) - dy[k] * (px - x[a]) + bias[k];
         }
@@ -265,7 +265,8 @@ impl Share<'_> {
         for k in bits(hit) {
             let l = k as usize;
             let t = g.tris[l];
-            let z = t.map(|v| self.vertices.z[self.draw.first_vertex + v as usize]);
+            let depth = |v: u32| self.vertices.z[self.draw.first_vertex + v as usize];
+            let z = [depth(t[0]), depth(t[1]), depth(t[2])];
             let (z1, z2) = if turn.0[l] < 0 { (z[2], z[1]) } else { (z[1], z[2]) };
             let scale = 1.0 / area.0[l] as f32;
             let z =

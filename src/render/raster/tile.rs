@@ -1,12 +1,14 @@
 //! A row of tiles: visibility, then colour, one tile after the other.
 
-use super::encode::{Planes, Target};
+use super::blend::{self, BlendScratch};
+use super::encode::Target;
 use super::fill::{Visibility, Walk};
-use super::frame::Frame;
-use super::resolve::{self, Entries};
+use super::frame::{Class, Frame};
+use super::resolve::{self, Area, Entries, LastDraw, Planes};
 use super::setup::{Bins, Fragment};
+use super::surface::Present;
 use super::{Stats, TILE};
-use crate::math::simd::Kernel;
+use crate::math::simd::{F8, I8, Kernel};
 
 /// Working memory of one thread.
 #[derive(Debug, Default)]
@@ -15,6 +17,8 @@ pub(super) struct TileScratch {
     pub seen: Visibility,
     pub entries: Entries,
     pub planes: Planes,
+    pub blend: BlendScratch,
+    pub last_draw: LastDraw,
 }
 
 /// The tiles of one row.
@@ -52,27 +56,47 @@ impl Row<'_, '_> {
         }
 
         // What is visible at each sample?
-        let origin = [x as i32, (self.row * TILE) as i32];
-        let seen = &mut self.scratch.seen;
-        seen.clear(frame.samples);
+        let area = Area { origin: [x as i32, (self.row * TILE) as i32], w, h: self.target.rows() };
+        self.scratch.seen.clear(frame.samples);
         for bins in self.bins {
             for &s in &bins.tiles[index].solid {
-                if let Some(walk) = Walk::new(frame, &bins.setups[s as usize], origin) {
-                    walk.fill(frame.samples, seen);
-                }
+                self.solid(bins, s, area);
             }
-            bins.tiles[index].fragments.iter().for_each(|f| put(seen, f));
+            for f in &bins.tiles[index].fragments {
+                put(&mut self.scratch.seen, f);
+            }
         }
-        if self.target.write_ids(frame, x, w, seen) {
+        if self.target.write_ids(frame, x, w, &self.scratch.seen) {
             return;
         }
 
-        // What does it look like?
-        let rows = self.target.rows();
-        let scratch = &mut *self.scratch;
-        resolve::list(frame, [w, rows], scratch);
-        resolve::shade(frame, origin, scratch);
-        self.target.write(x, w, &scratch.planes);
+        // What does it look like, and what lies before it?
+        let transparent = self.bins.iter().any(|b| !b.tiles[index].blend.is_empty());
+        resolve::resolve(frame, area, transparent, self.scratch);
+        if transparent {
+            blend::blend(frame, self.bins, index, area, self.scratch);
+            self.scratch.planes.average();
+        }
+        self.target.write(x, w, &self.scratch.planes.c);
+    }
+
+    /// An opaque or masked triangle into the buffer.
+    #[inline(always)]
+    fn solid(&mut self, bins: &Bins, s: u32, area: Area) {
+        let frame = self.frame;
+        let setup = &bins.setups[s as usize];
+        let Some(walk) = Walk::new(frame, setup, area.origin) else { return };
+        let draw = &frame.draws[setup.draw as usize];
+        if draw.class == Class::Opaque {
+            return walk.fill(frame.samples, &mut self.scratch.seen, |_, _, wins| wins);
+        }
+        let [left, top] = area.corner(frame);
+        let id = setup.id - draw.first_triangle;
+        walk.fill(frame.samples, &mut self.scratch.seen, |at, offset, wins| {
+            let px = I8::IOTA.to_f32() + (left + (at % TILE) as f32 + offset[0]);
+            let py = F8::splat(top + (at / TILE) as f32 + offset[1]);
+            wins & Present { frame, draw, id, px, py }.mask()
+        });
     }
 }
 

@@ -1,0 +1,152 @@
+//! Materials at eight points: what the textures say, and the light that comes from there.
+
+use super::sample::{self, Uv};
+use super::shade::{self, Surface};
+use crate::math::simd::{self, F8, I8, Isa, V8};
+use crate::scene::{AlphaMode, Material, Scene, TextureRef};
+use glam::Affine2;
+
+/// Eight points of a surface, as a renderer finds them.
+pub(crate) trait Points {
+    /// Where they are, scene space.
+    fn position(&self) -> V8;
+    /// Unit, towards the eye.
+    fn view(&self) -> V8;
+    /// Interpolated or flat, unit, on the side where triangles wind counter-clockwise.
+    fn normal(&self) -> V8;
+    /// Mask of points that are seen from behind.
+    fn away(&self) -> I8;
+    /// Texture coordinates of a set.
+    fn uv(&self, set: u8) -> Uv;
+    /// Interpolated vertex colours, if the mesh has any.
+    fn color(&self) -> Option<[F8; 4]>;
+    /// Unit tangent and bitangent of a set of coordinates under a transform.
+    fn tangent_frame(&self, normal: V8, map: &TextureRef) -> (V8, V8);
+}
+
+/// The scene's textures at eight points.
+struct Maps<'a> {
+    isa: Isa,
+    scene: &'a Scene<'a>,
+    uv: [Uv; 2],
+}
+
+impl<'a> Maps<'a> {
+    #[inline(always)]
+    fn new(isa: Isa, scene: &'a Scene, m: &Material, p: &impl Points) -> Self {
+        let maps = [&m.diffuse_map, &m.specular_map, &m.emissive_map, &m.normal_map, &m.occlusion_map];
+        let mut used = [false; 2];
+        maps.iter().filter_map(|m| m.as_ref()).for_each(|m| used[(m.uv_set & 1) as usize] = true);
+        let mut uv = [Uv::ZERO; 2];
+        for set in 0..2 {
+            if used[set] {
+                uv[set] = p.uv(set as u8);
+            }
+        }
+        Self { isa, scene, uv }
+    }
+
+    /// `None` where there is no such map, or the scene has no such texture.
+    #[inline(always)]
+    fn texel(&self, map: &Option<TextureRef>) -> Option<[F8; 4]> {
+        let map = map.as_ref()?;
+        self.look_up(map)
+    }
+
+    #[inline(never)]
+    fn look_up(&self, map: &TextureRef) -> Option<[F8; 4]> {
+        let texture = self.scene.textures.get(map.texture.0 as usize)?;
+        let uv = transformed(self.uv[(map.uv_set & 1) as usize], &map.transform);
+        Some(sample::sample(self.isa, texture, &uv))
+    }
+}
+
+#[inline(always)]
+fn transformed(uv: Uv, by: &Affine2) -> Uv {
+    if *by == Affine2::IDENTITY {
+        return uv;
+    }
+    let (x, y, t) = (by.matrix2.x_axis, by.matrix2.y_axis, by.translation);
+    let turn = |a: F8, b: F8| [a * x.x + b * y.x, a * x.y + b * y.y];
+    let [u, v] = turn(uv.u, uv.v);
+    Uv { u: u + t.x, v: v + t.y, right: turn(uv.right[0], uv.right[1]), down: turn(uv.down[0], uv.down[1]) }
+}
+
+/// `k_d` and alpha.
+#[inline(always)]
+fn diffuse(maps: &Maps, m: &Material, p: &impl Points) -> (V8, F8) {
+    let d = m.diffuse;
+    let (mut rgb, mut alpha) = (V8::splat(d.truncate()), F8::splat(d.w));
+    if let Some(c) = p.color() {
+        rgb = rgb * V8 { x: c[0], y: c[1], z: c[2] };
+        alpha = alpha * c[3];
+    }
+    if let Some(t) = maps.texel(&m.diffuse_map) {
+        rgb = rgb * V8 { x: t[0], y: t[1], z: t[2] };
+        alpha = alpha * t[3];
+    }
+    (rgb, alpha)
+}
+
+/// Mask of points where a surface with a cut-off is there.
+#[inline(always)]
+pub(crate) fn present(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> I8 {
+    match m.alpha {
+        AlphaMode::Mask(cut_off) => diffuse(&Maps::new(isa, scene, m, p), m, p).1.ge(F8::splat(cut_off)),
+        _ => I8::splat(-1),
+    }
+}
+
+/// Linear light, and alpha: 1 unless the material blends. Not multiplied.
+#[inline(always)]
+pub(crate) fn light(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> (V8, F8) {
+    let maps = &Maps::new(isa, scene, m, p);
+    let (k_d, alpha) = diffuse(maps, m, p);
+    let alpha = if m.alpha == AlphaMode::Blend { alpha.clamp01() } else { F8::ONE };
+    if m.unlit {
+        return (k_d, alpha);
+    }
+    let (specular, shininess) = highlight(maps, m);
+    let mut emissive = V8::splat(m.emissive);
+    if let Some(t) = maps.texel(&m.emissive_map) {
+        emissive = emissive * V8 { x: t[0], y: t[1], z: t[2] };
+    }
+    let openness = match maps.texel(&m.occlusion_map) {
+        Some(t) => (t[0] + -1.0) * m.occlusion_strength + 1.0,
+        None => F8::ONE,
+    };
+    let surface = Surface {
+        position: p.position(),
+        normal: normal(maps, m, p),
+        view: p.view(),
+        diffuse: k_d,
+        specular,
+        shininess,
+        openness,
+        emissive,
+    };
+    (shade::blinn_phong(&surface, scene.ambient, &scene.lights), alpha)
+}
+
+/// `k_s` and `p`.
+#[inline(always)]
+fn highlight(maps: &Maps, m: &Material) -> (V8, F8) {
+    let (k_s, shininess) = (V8::splat(m.specular), F8::splat(m.shininess));
+    match maps.texel(&m.specular_map) {
+        Some(t) => (k_s * V8 { x: t[0], y: t[1], z: t[2] }, simd::pow(shininess, t[3])),
+        None => (k_s, shininess),
+    }
+}
+
+/// The shading normal, on the eye's side.
+#[inline(always)]
+fn normal(maps: &Maps, m: &Material, p: &impl Points) -> V8 {
+    let mut n = p.normal();
+    if let (Some(map), Some(t)) = (&m.normal_map, maps.texel(&m.normal_map)) {
+        let (tangent, bitangent) = p.tangent_frame(n, map);
+        let x = (t[0] * 2.0 + -1.0) * m.normal_scale;
+        let y = (t[1] * 2.0 + -1.0) * m.normal_scale;
+        n = (tangent * x + bitangent * y + n * (t[2] * 2.0 + -1.0)).unit();
+    }
+    if m.double_sided { shade::facing(n, p.away()) } else { n }
+}
