@@ -1,6 +1,9 @@
 //! The shipped characters. Each is a function from nothing to files.
 
+mod biped;
+mod fox;
 mod kit;
+mod octopus;
 mod robot_arm;
 
 /// A file to be written.
@@ -13,5 +16,5 @@ pub struct File {
 
 /// Every file in `rigs/` and `poses/` that the maker builds.
 pub fn all() -> Vec<File> {
-    [robot_arm::files()].into_iter().flatten().collect()
+    [robot_arm::files(), octopus::files(), biped::files(), fox::files()].into_iter().flatten().collect()
 }

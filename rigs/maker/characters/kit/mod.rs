@@ -1,8 +1,13 @@
 //! What characters are built from: bones, solids, skins and motion.
 
 pub mod bones;
+pub mod face;
+pub mod field;
+pub mod gait;
 pub mod motion;
 pub mod parts;
+pub mod skin;
+pub mod surface;
 
 use super::File;
 use sinew::io::rig_json::{Clip, Color, Material, Mesh, Poses, Rig};

@@ -16,12 +16,14 @@ pub struct Stance<'a> {
     pub turns: Vec<DQuat>,
     /// Displacement of the head from rest, in axes named at rest, against the parent.
     pub offsets: Vec<DVec3>,
+    /// Factors along the bone's own axes.
+    pub scales: Vec<DVec3>,
 }
 
 impl<'a> Stance<'a> {
     pub fn rest(bones: &'a Bones) -> Self {
         let n = bones.list.len();
-        Self { bones, turns: vec![DQuat::IDENTITY; n], offsets: vec![DVec3::ZERO; n] }
+        Self { bones, turns: vec![DQuat::IDENTITY; n], offsets: vec![DVec3::ZERO; n], scales: vec![DVec3::ONE; n] }
     }
 
     /// Turn a bone further, by degrees about an axis named at rest.
@@ -119,6 +121,7 @@ pub fn clip<'a>(
     for bone in 0..bones.list.len() {
         tracks.extend(rotation_track(bones, bone, &samples, &time));
         tracks.extend(offset_track(bones, bone, &samples, &time));
+        tracks.extend(scale_track(bones, bone, &samples, &time));
     }
     Clip {
         name: name.into(),
@@ -173,6 +176,17 @@ fn offset_track(
     let moves = rows.iter().any(|r| r[1..].iter().any(|a| a.abs() > 0.0));
     let rows = if constant(&rows) { rows[..1].to_vec() } else { rows };
     moves.then(|| Track { bone: bones.list[bone].name.clone(), offset: Some(rows), ..Default::default() })
+}
+
+fn scale_track(bones: &Bones, bone: usize, samples: &[Stance], time: &dyn Fn(usize) -> f64) -> Option<Track> {
+    let row = |(k, s): (usize, &Stance)| {
+        let mut row = vec![time(k)];
+        row.extend(s.scales[bone].to_array().map(|x| round(x, 4)));
+        row
+    };
+    let rows: Vec<Vec<f64>> = samples.iter().enumerate().map(row).collect();
+    let moves = rows.iter().any(|r| r[1..].iter().any(|x| *x != 1.0));
+    moves.then(|| Track { bone: bones.list[bone].name.clone(), scale: Some(rows), ..Default::default() })
 }
 
 fn constant(rows: &[Vec<f64>]) -> bool {
