@@ -86,8 +86,16 @@ fn look(bones: &Bones) -> Look {
 
 fn body(b: &Bones, m: &mut Machine) {
     // A turned foot with a row of bolts.
-    let foot =
-        [(0.0, 0.0), (0.0, 0.29), (0.02, 0.31), (0.06, 0.31), (0.08, 0.29), (0.1, 0.21), (0.15, 0.18), (0.16, 0.0)];
+    let foot = [
+        (0.0, 0.0),
+        (0.0, 0.29),
+        (0.02, 0.31),
+        (0.06, 0.31),
+        (0.08, 0.29),
+        (0.1, 0.21),
+        (0.15, 0.18),
+        (0.16, 0.0),
+    ];
     m.add(b, "base", "steel", lathe(&foot, 40).along(DVec3::Y));
     for k in 0..10 {
         let a = std::f64::consts::TAU * (k as f64 + 0.5) / 10.0;
@@ -100,7 +108,8 @@ fn body(b: &Bones, m: &mut Machine) {
     m.add(b, "turret", "paint", lathe(&drum, 36).along(DVec3::Y));
     m.add(b, "turret", "dark", cylinder(0.02, 0.188, 0.004, 36).along(DVec3::Y).at([0.0, 0.215, 0.0]));
     for x in [-1.0, 1.0] {
-        let cheek = taper_box(0.27, SHOULDER, [-0.028, 0.028, -0.13, 0.13], [-0.028, 0.028, -0.09, 0.09], 0.012);
+        let cheek =
+            taper_box(0.27, SHOULDER, [-0.028, 0.028, -0.13, 0.13], [-0.028, 0.028, -0.09, 0.09], 0.012);
         m.add(b, "turret", "paint", upright(cheek).at([x * 0.125, 0.0, 0.0]));
         m.add(b, "turret", "paint", cylinder(0.056, 0.1, 0.012, 32).at([x * 0.125, SHOULDER, 0.0]));
         m.add(b, "turret", "light", cylinder(0.02, 0.05, 0.006, 20).at([x * 0.158, SHOULDER, 0.0]));
@@ -150,7 +159,12 @@ fn hand(b: &Bones, m: &mut Machine) {
     // The eye sits on top of the wrist and looks along the tool.
     let eye = [0.0, ELBOW + 0.085, WRIST + 0.09];
     m.add(b, "wrist", "light", cylinder(0.1, 0.05, 0.014, 24).along(DVec3::Z).at(eye));
-    m.add(b, "wrist", "dark", cylinder(0.02, 0.042, 0.004, 24).along(DVec3::Z).at([0.0, eye[1], eye[2] + 0.046]));
+    m.add(
+        b,
+        "wrist",
+        "dark",
+        cylinder(0.02, 0.042, 0.004, 24).along(DVec3::Z).at([0.0, eye[1], eye[2] + 0.046]),
+    );
     let lens = ball(0.034, 8, 18).by(DAffine3::from_scale(DVec3::new(0.5, 1.0, 1.0)));
     m.add(b, "wrist", "glow", lens.along(DVec3::Z).at([0.0, eye[1], eye[2] + 0.052]));
 
@@ -159,7 +173,12 @@ fn hand(b: &Bones, m: &mut Machine) {
     m.add(b, "palm", "dark", bevel_box([-0.14, -0.015, 0.205], [0.14, 0.015, 0.225], 0.004).at(at(0.0)));
     for (name, s) in [("finger.L", 1.0), ("finger.R", -1.0)] {
         let x = s * 0.1;
-        m.add(b, name, "steel", bevel_box([x - 0.018, -0.028, 0.215], [x + 0.018, 0.028, 0.26], 0.006).at(at(0.0)));
+        m.add(
+            b,
+            name,
+            "steel",
+            bevel_box([x - 0.018, -0.028, 0.215], [x + 0.018, 0.028, 0.26], 0.006).at(at(0.0)),
+        );
         let blade = bevel_box([x - 0.009, -0.022, 0.25], [x + 0.009, 0.022, 0.38], 0.006);
         m.add(b, name, "steel", blade.at(at(0.0)).at([s * 0.008, 0.0, 0.0]));
         let pad = bevel_box([x - 0.007, -0.02, 0.3], [x + 0.007, 0.02, 0.375], 0.004);

@@ -17,7 +17,7 @@ pub struct Foot {
     pub strike_deg: f64,
     /// Heel up at take-off, degrees.
     pub push_deg: f64,
-    /// Heel and ball of the foot, below and around the ankle at rest.
+    /// Middles of the round heel and of the ball of the foot, from the ankle at rest.
     pub heel: DVec3,
     pub ball: DVec3,
 }
@@ -40,7 +40,12 @@ impl Foot {
             let u = phase / s;
             let down = 1.0 - ease(u / 0.25);
             let up = ease((u - 0.5) / 0.5);
-            self.step(self.forward + self.reach * (1.0 - 2.0 * u), 0.0, -self.strike_deg * down + self.push_deg * up, up)
+            self.step(
+                self.forward + self.reach * (1.0 - 2.0 * u),
+                0.0,
+                -self.strike_deg * down + self.push_deg * up,
+                up,
+            )
         } else {
             // A cubic from take-off to touch-down that leaves and arrives at the ground's speed.
             let u = (phase - s) / (1.0 - s);

@@ -127,7 +127,8 @@ pub fn lathe(profile: &[(f64, f64)], sides: u32) -> Solid {
 /// A cylinder along x, centred, with bevelled rims.
 pub fn cylinder(length: f64, radius: f64, bevel: f64, sides: u32) -> Solid {
     let h = 0.5 * length;
-    let rim = [(-h, 0.0), (-h, radius - bevel), (-h + bevel, radius), (h - bevel, radius), (h, radius - bevel)];
+    let rim =
+        [(-h, 0.0), (-h, radius - bevel), (-h + bevel, radius), (h - bevel, radius), (h, radius - bevel)];
     lathe(&[rim.as_slice(), &[(h, 0.0)]].concat(), sides)
 }
 
