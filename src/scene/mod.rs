@@ -3,6 +3,7 @@
 mod camera;
 mod light;
 mod material;
+mod mips;
 mod texture;
 
 pub use camera::{Camera, CameraError, Projection};

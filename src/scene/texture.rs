@@ -53,7 +53,7 @@ pub struct TextureError {
 
 impl Texture {
     /// Build from RGBA bytes, rows from the top. `srgb`: RGB are sRGB codes (alpha never is); mip levels are then averaged
-    /// in linear light.
+    /// in linear light. Colours count by their alpha in those means.
     ///
     /// # Errors
     /// [`TextureError`] where the bytes do not fit the size.
@@ -69,7 +69,7 @@ impl Texture {
         if expected == 0 || rgba.len() as u64 != expected {
             return Err(TextureError { width, height, expected, found: rgba.len() as u64 });
         }
-        Ok(Self { width, height, srgb, wrap, filter, levels: vec![rgba] })
+        Ok(Self { width, height, srgb, wrap, filter, levels: super::mips::chain(width, height, rgba, srgb) })
     }
 
     /// Pixels a row of the finest level.

@@ -38,13 +38,9 @@ impl<'a, const ONE: bool> Seen<'a, ONE> {
         let (mut p, mut clip) = ([V8::ZERO; 3], [[F8::ZERO; 3]; 3]);
         for i in 0..3 {
             p[i] = vectors::<ONE>(draw.object.positions, &corner[i]);
-            let [x, y, w] = if ONE {
-                let c = frame.project.point(draw.object.positions[corner[i][0] as usize]);
-                [F8::splat(c.x), F8::splat(c.y), F8::splat(c.w)]
-            } else {
-                let m = &frame.project;
-                [Projector::row8(m.x, p[i]), Projector::row8(m.y, p[i]), Projector::row8(m.w, p[i])]
-            };
+            let m = &frame.project;
+            let [x, y, w] =
+                [Projector::row8(m.x, p[i]), Projector::row8(m.y, p[i]), Projector::row8(m.w, p[i])];
             clip[i] = [x - px * w, y - py * w, w];
         }
         let e = [cross(&clip[1], &clip[2]), cross(&clip[2], &clip[0]), cross(&clip[0], &clip[1])];

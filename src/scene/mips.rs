@@ -1,0 +1,106 @@
+//! Mip chains: each level the area-weighted mean of the one before, in linear light.
+
+use crate::image::color::{LINEAR_OF_SRGB8, srgb8};
+use std::sync::LazyLock;
+
+/// 8-bit sRGB codes of 65536 equal steps of linear light.
+static CODES: LazyLock<Vec<u8>> = LazyLock::new(|| (0..65536).map(|i| srgb8(i as f32 / 65535.0)).collect());
+
+/// All levels down to 1×1; each side is half of the one before, rounded down, at least 1.
+pub(super) fn chain(width: u32, height: u32, rgba: Vec<u8>, srgb: bool) -> Vec<Vec<u8>> {
+    let (mut w, mut h) = (width as usize, height as usize);
+    let mut levels = vec![rgba];
+    while w > 1 || h > 1 {
+        let next = if srgb {
+            half_srgb(levels.last().expect("one"), w, h)
+        } else {
+            half_linear(&levels[levels.len() - 1], w, h)
+        };
+        levels.push(next);
+        (w, h) = ((w / 2).max(1), (h / 2).max(1));
+    }
+    levels
+}
+
+fn half_srgb(from: &[u8], w: usize, h: usize) -> Vec<u8> {
+    let (linear, codes) = (&*LINEAR_OF_SRGB8, &**CODES);
+    half(from, w, h, |c| linear[c as usize], |v| codes[(v * 65535.0 + 0.5) as usize & 0xffff])
+}
+
+fn half_linear(from: &[u8], w: usize, h: usize) -> Vec<u8> {
+    half(from, w, h, |c| c as f32, |v| (v + 0.5) as u8)
+}
+
+/// Source texels of one target texel along a side: the first, and the weights of three, whose sum is 1.
+///
+/// Of an odd side `2n+1`, target `i` covers texels `2i`, `2i+1` and `2i+2` by `n−i`, `n` and `i+1` parts.
+fn taps(side: usize) -> Vec<(usize, [f32; 3])> {
+    let n = (side / 2).max(1);
+    let one = |i: usize| match side {
+        1 => (0, [1.0, 0.0, 0.0]),
+        _ if side.is_multiple_of(2) => (2 * i, [0.5, 0.5, 0.0]),
+        _ => (2 * i, [(n - i) as f32 / side as f32, n as f32 / side as f32, (i + 1) as f32 / side as f32]),
+    };
+    (0..n).map(one).collect()
+}
+
+/// The next level. Colours count by their alpha, so that what is invisible does not bleed into what is not.
+#[inline(always)]
+fn half(from: &[u8], w: usize, h: usize, decode: impl Fn(u8) -> f32, encode: impl Fn(f32) -> u8) -> Vec<u8> {
+    let (columns, rows) = (taps(w), taps(h));
+    let texels = from.as_chunks::<4>().0;
+    let (wide, high) =
+        (if w % 2 == 1 && w > 1 { 3 } else { w.min(2) }, if h % 2 == 1 && h > 1 { 3 } else { h.min(2) });
+    let mut out = Vec::with_capacity(4 * columns.len() * rows.len());
+    for (y, row_weights) in &rows {
+        for (x, column_weights) in &columns {
+            let (mut sum, mut plain, mut alpha) = ([0f32; 3], [0f32; 3], 0f32);
+            for j in 0..high {
+                for (i, t) in texels[(y + j) * w + x..][..wide].iter().enumerate() {
+                    let weight = row_weights[j] * column_weights[i];
+                    let a = weight * t[3] as f32;
+                    alpha += a;
+                    for c in 0..3 {
+                        let v = decode(t[c]);
+                        sum[c] += a * v;
+                        plain[c] += weight * v;
+                    }
+                }
+            }
+            let scale = 1.0 / alpha;
+            let color = |c: usize| encode(if alpha > 0.0 { sum[c] * scale } else { plain[c] });
+            out.extend_from_slice(&[color(0), color(1), color(2), (alpha + 0.5) as u8]);
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn black_and_white_meet_in_linear_light() {
+        let levels = chain(2, 1, vec![0, 0, 0, 255, 255, 255, 255, 255], true);
+        // sRGB of one half is 187.5.
+        assert_eq!(levels[1], [188, 188, 188, 255]);
+        assert_eq!(chain(2, 1, vec![0, 10, 0, 255, 255, 20, 255, 255], false)[1], [128, 15, 128, 255]);
+    }
+
+    #[test]
+    fn what_is_invisible_does_not_bleed() {
+        let levels = chain(2, 1, vec![200, 100, 50, 255, 0, 255, 0, 0], true);
+        assert_eq!(levels[1], [200, 100, 50, 128]);
+    }
+
+    #[test]
+    fn odd_sizes_keep_the_mean() {
+        // Five texels to two: the middle one counts half in each.
+        let row: Vec<u8> = [10, 20, 30, 40, 50].iter().flat_map(|&v| [v, v, v, 255]).collect();
+        let levels = chain(5, 1, row, false);
+        assert_eq!(levels.iter().map(|l| l.len() / 4).collect::<Vec<_>>(), [5, 2, 1]);
+        assert_eq!((levels[1][0], levels[1][4], levels[2][0]), (18, 42, 30));
+        let flat = chain(7, 3, vec![77; 4 * 21], true);
+        assert!(flat.iter().flatten().all(|&v| v == 77));
+    }
+}
