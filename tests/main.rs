@@ -1,1 +1,4 @@
 //! What the library promises, a module a subject.
+
+#[cfg(all(feature = "io", feature = "pictures"))]
+mod corpus;

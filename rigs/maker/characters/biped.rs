@@ -102,8 +102,8 @@ fn body(b: &Bones) -> Field {
         f.bone(b, &n("thigh"), [0.088, 0.068], 0.05, TEAL);
         f.bone(b, &n("shin"), [0.068, 0.06], 0.008, TEAL);
         let (foot, toes) = (id(&n("foot")), id(&n("toes")));
-        let lift = DVec3::Y * 0.022;
-        f.limb(foot, [b.heads[foot] - DVec3::Y * 0.02, b.tails[foot] + lift], [0.064, 0.057], 0.03, DEEP);
+        let lift = DVec3::Y * 0.027;
+        f.limb(foot, [b.heads[foot] - DVec3::Y * 0.015, b.tails[foot] + lift], [0.064, 0.057], 0.03, DEEP);
         f.limb(toes, [b.heads[toes] + lift, b.tails[toes] + lift * 0.7], [0.057, 0.05], 0.02, DEEP);
     }
     f
@@ -138,8 +138,8 @@ fn foot(stance: f64, reach: f64, lift: f64, strike_deg: f64, push_deg: f64) -> F
         lift,
         strike_deg,
         push_deg,
-        heel: DVec3::new(0.0, -0.02, 0.0),
-        ball: DVec3::new(0.0, -0.028, 0.1),
+        heel: DVec3::new(0.0, -0.015, 0.0),
+        ball: DVec3::new(0.0, -0.023, 0.1),
     }
 }
 
@@ -208,8 +208,8 @@ fn plant(s: &mut Stance, side: &str, ankle: DVec3, pitch_deg: f64, toes_deg: f64
 
 fn walk(b: &Bones) -> Clip {
     let g = Gait {
-        foot: foot(0.6, 0.16, 0.055, 22.0, 42.0),
-        low: -0.022,
+        foot: foot(0.6, 0.15, 0.055, 22.0, 42.0),
+        low: -0.034,
         bob: 0.012,
         high: 0.3,
         lean_deg: 4.0,
@@ -223,8 +223,8 @@ fn walk(b: &Bones) -> Clip {
 
 fn run(b: &Bones) -> Clip {
     let g = Gait {
-        foot: Foot { forward: -0.02, ..foot(0.34, 0.17, 0.17, 8.0, 55.0) },
-        low: 0.0,
+        foot: Foot { forward: -0.02, ..foot(0.34, 0.16, 0.16, 8.0, 52.0) },
+        low: -0.042,
         bob: 0.035,
         high: 0.43,
         lean_deg: 17.0,

@@ -74,7 +74,7 @@ fn look(b: &Bones) -> Look {
     look.material("navy", 0x163a7d, 0.12, 20.0);
     eye_materials(&mut look, 0xf2e27a);
     let body = body(b);
-    let solid = polygonise(&body, 0.0205);
+    let solid = polygonise(&body, 0.0242);
     look.meshes.push(skin("body", "plumage", b, &body, solid, 7, paint));
     let mut m = Machine::default();
     for s in [1.0, -1.0] {
@@ -139,8 +139,8 @@ fn body(b: &Bones) -> Field {
         f.bone(b, &n("humerus"), [0.055, 0.04], 0.05, RED);
         f.bone(b, &n("forearm"), [0.04, 0.033], 0.01, RED);
         f.bone(b, &n("hand"), [0.033, 0.018], 0.01, RED);
-        f.bone(b, &n("thigh"), [0.045, 0.03], 0.03, RED);
-        f.bone(b, &n("foot"), [0.026, 0.022], 0.012, DARK);
+        f.bone(b, &n("thigh"), [0.045, 0.034], 0.03, RED);
+        f.bone(b, &n("foot"), [0.03, 0.028], 0.012, DARK);
     }
     f
 }

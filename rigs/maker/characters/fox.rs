@@ -120,7 +120,7 @@ fn body(b: &Bones) -> Field {
     }
     for side in ["L", "R"] {
         let n = |name: &str| format!("{name}.{side}");
-        f.bone(b, &n("ear"), [0.052, 0.016], 0.04, ORANGE);
+        f.bone(b, &n("ear"), [0.054, 0.024], 0.04, ORANGE);
         f.bone(b, &n("femur"), [0.092, 0.06], 0.05, ORANGE);
         f.bone(b, &n("tibia"), [0.06, 0.037], 0.012, ORANGE);
         f.bone(b, &n("metatarsus"), [0.037, 0.036], 0.008, BROWN);
@@ -213,10 +213,10 @@ fn legs(s: &mut Stance, g: &Gait, phase: f64) {
 fn gallop(b: &Bones) -> Clip {
     let g = Gait {
         order: [0.0, 0.09, 0.43, 0.53],
-        hind: paw(0.27, 0.2, 0.1, 0.11, 45.0),
+        hind: paw(0.27, 0.19, 0.1, 0.075, 42.0),
         fore: paw(0.26, 0.2, 0.05, 0.17, 40.0),
         lean_deg: 24.0,
-        fold_deg: 58.0,
+        fold_deg: 42.0,
     };
     clip("gallop", b, 0.56, 24, true, |phase| {
         let wave = |k: f64, at: f64| (TAU * k * (phase - at)).cos();

@@ -121,14 +121,14 @@ fn spine_row(b: &Bones, z: f64) -> Row {
 }
 
 fn body(b: &Bones) -> Mesh {
-    let (rings, sides) = (34, 24u32);
+    let (rings, sides) = (42, 24u32);
     let (snout, end) = (0.57, -0.66);
     let ring = |t: f64| {
         let (high, wide, middle) = girth(t);
         let center = DVec3::new(0.0, LEVEL + middle, snout + (end - snout) * t);
         Ring { center, u: DVec3::Y * high, v: DVec3::X * wide }
     };
-    let at: Vec<f64> = (0..rings).map(|k| (k as f64 / (rings - 1) as f64).powf(1.15)).collect();
+    let at: Vec<f64> = (0..rings).map(|k| (k as f64 / (rings - 1) as f64).powf(1.05)).collect();
     let list: Vec<Ring> = at.iter().map(|t| ring(*t)).collect();
     let poles = [DVec3::new(0.0, LEVEL - 0.012, snout + 0.012), DVec3::new(0.0, LEVEL, end - 0.008)];
     let solid = loft(&list, poles, sides);
@@ -146,7 +146,7 @@ fn body(b: &Bones) -> Mesh {
     let row = |p: &DVec3| {
         let mut row = spine_row(b, p.z);
         // The lower lip opens.
-        let open = ease((p.z - 0.47) / 0.06) * ease((LEVEL - 0.015 - p.y) / 0.02);
+        let open = 0.6 * ease((p.z - 0.43) / 0.12) * ease((LEVEL + 0.01 - p.y) / 0.08);
         row.values_mut().for_each(|w| *w *= 1.0 - open);
         *row.entry(jaw).or_insert(0.0) += open;
         row.retain(|_, w| *w > 1e-6);
@@ -194,7 +194,7 @@ fn fins_of(b: &Bones, look: &mut Look) {
     });
     fin(b, look, "tail fin", tail, |q, p| {
         let root = spine_row(b, -0.66);
-        let near = blend(root, "tail", ease(q.y / 0.35));
+        let near = blend(root, "tail", ease(q.y / 0.5));
         blend(near, "tail tip", ease((-0.68 - p.z) / 0.2))
     });
 
@@ -224,8 +224,8 @@ fn fins_of(b: &Bones, look: &mut Look) {
         let place =
             paddle(DVec3::new(0.085, 0.53, 0.19), DVec3::new(0.33, 0.41, 0.02), DVec3::new(0.05, 0.03, 0.15));
         fin(b, look, &n("pectoral fin"), sheet(8, 8, strip, place), |q, _| {
-            let near = blend(spine_row(b, 0.17), &n("pectoral"), ease(q.y / 0.15));
-            blend(near, &n("pectoral tip"), ease((q.y - 0.25) / 0.5))
+            let near = blend(spine_row(b, 0.17), &n("pectoral"), ease(q.y / 0.45));
+            blend(near, &n("pectoral tip"), ease((q.y - 0.3) / 0.6))
         });
         let place = paddle(
             DVec3::new(0.055, 0.475, -0.1),
@@ -233,7 +233,7 @@ fn fins_of(b: &Bones, look: &mut Look) {
             DVec3::new(0.01, 0.03, 0.09),
         );
         fin(b, look, &n("pelvic fin"), sheet(6, 5, strip, place), |q, _| {
-            blend(spine_row(b, -0.11), &n("pelvic"), ease(q.y / 0.3))
+            blend(spine_row(b, -0.11), &n("pelvic"), ease(q.y / 0.7))
         });
     }
     let anal = sheet(6, 4, strip, |u, v| {

@@ -71,7 +71,7 @@ fn look(b: &Bones) -> Look {
     look.meshes.push(skin("body", "skin", b, &body, solid, 6, paint));
     let mut m = Machine::default();
     for s in [1.0, -1.0] {
-        eye(&mut m, b, "body", [s * 0.098, 0.365, 0.125], 0.058, DVec3::new(s * 0.45, 0.1, 1.0));
+        eye(&mut m, b, "body", [s * 0.106, 0.372, 0.138], 0.058, DVec3::new(s * 0.45, 0.1, 1.0));
     }
     m.finish(b, &mut look, 180.0);
     look

@@ -57,7 +57,7 @@ impl Foot {
                 + slope * (u3 - u2);
             let rise = self.lift * (std::f64::consts::PI * u).sin().powi(2) * (1.4 - 0.8 * u);
             let pitch = self.push_deg + (-self.strike_deg - self.push_deg) * ease(u / 0.9);
-            self.step(self.forward + z, rise, pitch, 1.0 - ease(u / 0.3))
+            self.step(self.forward + z, rise, pitch, 1.0 - ease(u / 0.55))
         }
     }
 
@@ -65,7 +65,9 @@ impl Foot {
     fn step(&self, z: f64, rise: f64, pitch_deg: f64, toes: f64) -> Step {
         let turn = DQuat::from_rotation_x(pitch_deg.to_radians());
         let pivot = if pitch_deg > 0.0 { self.ball } else { self.heel };
-        let ankle = pivot - turn * pivot + DVec3::new(0.0, rise, z);
+        // Skin bulges below bent toes: a millimetre for every ten degrees makes room for it.
+        let room = 1e-4 * pitch_deg.max(0.0);
+        let ankle = pivot - turn * pivot + DVec3::new(0.0, rise + room, z);
         Step { ankle, pitch_deg, toes_deg: -pitch_deg.max(0.0) * toes }
     }
 }

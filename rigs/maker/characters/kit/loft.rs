@@ -56,7 +56,7 @@ pub fn feather(base: DVec3, tip: DVec3, up: DVec3, width: f64, thickness: f64) -
     let along = tip - base;
     let up = (up - along * (up.dot(along) / along.length_squared())).normalize();
     let side = along.cross(up).normalize();
-    let n = 7;
+    let n = 5;
     let ring = |t: f64| {
         // Quickly wide, longest at two thirds, round at the tip; a little cupped.
         let w = width * (1.0 - (1.0 - (t * 2.2).min(1.0)).powi(2)).sqrt() * (1.0 - t.powi(5)).sqrt();
@@ -64,7 +64,7 @@ pub fn feather(base: DVec3, tip: DVec3, up: DVec3, width: f64, thickness: f64) -
         Ring { center: base + along * t + bow, u: side * w.max(1e-3), v: up * thickness * (1.0 - 0.6 * t) }
     };
     let rings: Vec<Ring> = (1..=n).map(|k| ring(k as f64 / n as f64 * 0.97)).collect();
-    loft(&rings, [base, tip - up * (0.05 * along.length())], 10)
+    loft(&rings, [base, tip - up * (0.05 * along.length())], 8)
 }
 
 /// A sheet of `n × m` cells with texture coordinates; `place` and the picture's part run over 0…1.

@@ -63,11 +63,6 @@ impl<'a> Stance<'a> {
         }
     }
 
-    /// Where a point of a bone stands.
-    pub fn world_point(&self, bone: usize, rest: DVec3) -> DVec3 {
-        self.world_head(bone) + self.world_turn(bone) * (rest - self.bones.heads[bone])
-    }
-
     /// Turn a bone so that it has turned by `g` in the world.
     pub fn set_world_turn(&mut self, bone: usize, g: DQuat) {
         let up = self.bones.parents[bone].map_or(DQuat::IDENTITY, |p| self.world_turn(p));
