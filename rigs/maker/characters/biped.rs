@@ -70,7 +70,8 @@ fn look(b: &Bones) -> Look {
     for s in [1.0, -1.0] {
         eye(&mut m, b, "head", [s * 0.083, 1.03, 0.152], 0.062, DVec3::new(s * 0.22, 0.05, 1.0));
     }
-    let smile = arc(DVec3::new(0.0, 0.972, 0.187), DVec3::X * 0.062, DVec3::new(0.0, -0.04, 0.006), 150.0, 11);
+    let smile =
+        arc(DVec3::new(0.0, 0.972, 0.187), DVec3::X * 0.062, DVec3::new(0.0, -0.04, 0.006), 150.0, 11);
     m.add(b, "head", "mouth", cord(&smile, 0.008, 8));
     m.finish(b, &mut look, 180.0);
     look
@@ -101,8 +102,8 @@ fn body(b: &Bones) -> Field {
         f.bone(b, &n("thigh"), [0.088, 0.068], 0.05, TEAL);
         f.bone(b, &n("shin"), [0.068, 0.06], 0.008, TEAL);
         let (foot, toes) = (id(&n("foot")), id(&n("toes")));
-        let lift = DVec3::Y * 0.022;
-        f.limb(foot, [b.heads[foot] - DVec3::Y * 0.02, b.tails[foot] + lift], [0.064, 0.057], 0.03, DEEP);
+        let lift = DVec3::Y * 0.027;
+        f.limb(foot, [b.heads[foot] - DVec3::Y * 0.015, b.tails[foot] + lift], [0.064, 0.057], 0.03, DEEP);
         f.limb(toes, [b.heads[toes] + lift, b.tails[toes] + lift * 0.7], [0.057, 0.05], 0.02, DEEP);
     }
     f
@@ -111,7 +112,7 @@ fn body(b: &Bones) -> Field {
 /// A cream belly.
 fn paint(p: DVec3, _: DVec3, base: DVec3) -> DVec3 {
     let belly = ((p - DVec3::new(0.0, 0.6, 0.14)) / DVec3::new(0.115, 0.15, 0.13)).length();
-    base.lerp(linear(CREAM), 1.0 - ease((belly - 0.9) / 0.2))
+    base.lerp(linear(CREAM), 1.0 - ease((belly - 0.8) / 0.4))
 }
 
 /// How a gait goes; phases are those of the left leg.
@@ -137,8 +138,8 @@ fn foot(stance: f64, reach: f64, lift: f64, strike_deg: f64, push_deg: f64) -> F
         lift,
         strike_deg,
         push_deg,
-        heel: DVec3::new(0.0, -0.085, -0.045),
-        ball: DVec3::new(0.0, -0.085, 0.1),
+        heel: DVec3::new(0.0, -0.015, 0.0),
+        ball: DVec3::new(0.0, -0.023, 0.1),
     }
 }
 
@@ -154,7 +155,12 @@ fn stride<'a>(b: &'a Bones, g: &Gait, phase: f64) -> Stance<'a> {
     s.pose("spine", g.lean_deg * 0.3, g.twist_deg * wave(1.0, 0.02), 0.2 * g.twist_deg * wave(1.0, mid));
     s.pose("chest", g.lean_deg * 0.3, g.twist_deg * wave(1.0, 0.03), 0.2 * g.twist_deg * wave(1.0, mid));
     s.pose("neck", -g.lean_deg * 0.4, -0.5 * g.twist_deg * wave(1.0, 0.03), 0.0);
-    s.pose("head", -g.lean_deg * 0.5 + 60.0 * g.bob * wave(2.0, g.high + 0.12), -0.4 * g.twist_deg * wave(1.0, 0.04), 0.0);
+    s.pose(
+        "head",
+        -g.lean_deg * 0.5 + 60.0 * g.bob * wave(2.0, g.high + 0.12),
+        -0.4 * g.twist_deg * wave(1.0, 0.04),
+        0.0,
+    );
 
     // Arms swing against the legs; the elbow bends more in front, the hand drags.
     for (side, sign, shift) in [("L", 1.0, 0.5), ("R", -1.0, 0.0)] {
@@ -202,8 +208,8 @@ fn plant(s: &mut Stance, side: &str, ankle: DVec3, pitch_deg: f64, toes_deg: f64
 
 fn walk(b: &Bones) -> Clip {
     let g = Gait {
-        foot: foot(0.6, 0.16, 0.055, 22.0, 42.0),
-        low: -0.022,
+        foot: foot(0.6, 0.15, 0.055, 22.0, 42.0),
+        low: -0.034,
         bob: 0.012,
         high: 0.3,
         lean_deg: 4.0,
@@ -217,8 +223,8 @@ fn walk(b: &Bones) -> Clip {
 
 fn run(b: &Bones) -> Clip {
     let g = Gait {
-        foot: Foot { forward: -0.02, ..foot(0.34, 0.17, 0.17, 8.0, 55.0) },
-        low: 0.0,
+        foot: Foot { forward: -0.02, ..foot(0.34, 0.16, 0.16, 8.0, 52.0) },
+        low: -0.042,
         bob: 0.035,
         high: 0.43,
         lean_deg: 17.0,
@@ -257,7 +263,11 @@ fn wave(b: &Bones) -> Clip {
         for (side, sign) in [("L", 1.0), ("R", -1.0)] {
             let late = 6.0 * up * osc(6.0, 1.2);
             s.turn(&format!("ear.{side}"), DVec3::Z, late + sign * 6.0 * up);
-            s.turn(&format!("ear tip.{side}"), DVec3::Z, 2.0 * up * osc(6.0, 2.2) + sign * 3.0 * osc(2.0, 0.9));
+            s.turn(
+                &format!("ear tip.{side}"),
+                DVec3::Z,
+                2.0 * up * osc(6.0, 2.2) + sign * 3.0 * osc(2.0, 0.9),
+            );
             plant(&mut s, side, DVec3::ZERO, 0.0, 0.0);
         }
         for (k, name) in ["tail 1", "tail 2", "tail 3"].into_iter().enumerate() {

@@ -72,11 +72,11 @@ fn look(b: &Bones) -> Look {
     look.material("fur", 0xffffff, 0.06, 14.0);
     eye_materials(&mut look, 0xc98a1b);
     let body = body(b);
-    let solid = polygonise(&body, 0.0265);
+    let solid = polygonise(&body, 0.0275);
     look.meshes.push(skin("body", "fur", b, &body, solid, 8, |p, n, base| paint(b, p, n, base)));
     let mut m = Machine::default();
     for s in [1.0, -1.0] {
-        eye(&mut m, b, "head", [s * 0.062, 0.735, 0.565], 0.03, DVec3::new(s * 0.55, 0.12, 1.0));
+        eye(&mut m, b, "head", [s * 0.058, 0.737, 0.545], 0.036, DVec3::new(s * 0.5, 0.1, 1.0));
     }
     m.add(b, "head", "pupil", ball(0.024, 8, 14).at([0.0, 0.69, 0.705]));
     m.finish(b, &mut look, 180.0);
@@ -94,15 +94,33 @@ fn body(b: &Bones) -> Field {
     f.bone(b, "neck", [0.1, 0.075], 0.07, ORANGE);
     f.egg(id("head"), [0.0, 0.72, 0.47], [0.112, 0.098, 0.11], none, 0.05, ORANGE);
     f.egg(id("head"), [0.0, 0.69, 0.5], [0.13, 0.055, 0.07], none, 0.05, CREAM);
-    f.limb(id("head"), [DVec3::new(0.0, 0.695, 0.55), DVec3::new(0.0, 0.682, 0.675)], [0.055, 0.03], 0.05, ORANGE);
-    f.limb(id("jaw"), [DVec3::new(0.0, 0.655, 0.54), DVec3::new(0.0, 0.652, 0.64)], [0.036, 0.024], 0.03, CREAM);
+    f.limb(
+        id("head"),
+        [DVec3::new(0.0, 0.695, 0.55), DVec3::new(0.0, 0.682, 0.675)],
+        [0.055, 0.03],
+        0.05,
+        ORANGE,
+    );
+    f.limb(
+        id("jaw"),
+        [DVec3::new(0.0, 0.655, 0.54), DVec3::new(0.0, 0.652, 0.64)],
+        [0.036, 0.024],
+        0.03,
+        CREAM,
+    );
     for (k, name) in TAIL.into_iter().enumerate() {
         let r = [0.04, 0.065, 0.085, 0.092, 0.075, 0.03];
-        f.bone(b, name, [r[k], r[k + 1]], if k == 0 { 0.05 } else { 0.01 }, if k < 3 { ORANGE } else { CREAM });
+        f.bone(
+            b,
+            name,
+            [r[k], r[k + 1]],
+            if k == 0 { 0.05 } else { 0.01 },
+            if k < 3 { ORANGE } else { CREAM },
+        );
     }
     for side in ["L", "R"] {
         let n = |name: &str| format!("{name}.{side}");
-        f.bone(b, &n("ear"), [0.052, 0.016], 0.04, ORANGE);
+        f.bone(b, &n("ear"), [0.054, 0.024], 0.04, ORANGE);
         f.bone(b, &n("femur"), [0.092, 0.06], 0.05, ORANGE);
         f.bone(b, &n("tibia"), [0.06, 0.037], 0.012, ORANGE);
         f.bone(b, &n("metatarsus"), [0.037, 0.036], 0.008, BROWN);
@@ -119,16 +137,16 @@ fn body(b: &Bones) -> Field {
 /// Cream below, dark socks and ear tips.
 fn paint(b: &Bones, p: DVec3, n: DVec3, base: DVec3) -> DVec3 {
     let mix = |from: DVec3, to: u32, t: f64| from.lerp(linear(to), t.clamp(0.0, 1.0));
-    let torso = p.z < 0.42 && p.z > -0.3 && p.x.abs() < 0.1 && p.y > 0.3;
-    let mut c = if torso { mix(base, CREAM, ease((-n.y - 0.35) / 0.35)) } else { base };
+    let belly = ease((0.16 - p.z) / 0.06) * ease((p.z + 0.3) / 0.08) * ease((p.y - 0.3) / 0.05);
+    let mut c = mix(base, CREAM, belly * ease((-n.y - 0.3) / 0.5));
     // A bib from the chin down to the chest.
     let bib = ((p - DVec3::new(0.0, 0.52, 0.38)) / DVec3::new(0.085, 0.15, 0.11)).length();
-    c = mix(c, CREAM, ease((1.1 - bib) / 0.2));
-    c = mix(c, CREAM, ease((0.69 - p.y) / 0.02) * ease((p.z - 0.46) / 0.05));
+    c = mix(c, CREAM, ease((1.3 - bib) / 0.5));
+    c = mix(c, CREAM, ease((0.7 - p.y) / 0.05) * ease((p.z - 0.45) / 0.06));
     if p.y < 0.3 && p.z > -0.45 {
         c = mix(c, BROWN, ease((0.2 - p.y) / 0.05));
     }
-    c = mix(c, CREAM, ease((-p.z - 0.74) / 0.04));
+    c = mix(c, CREAM, ease((-p.z - 0.73) / 0.06));
     mix(c, BROWN, ease((p.y - b.tail("ear.L").y + 0.06) / 0.03))
 }
 
@@ -163,8 +181,8 @@ fn paw(stance: f64, reach: f64, forward: f64, lift: f64, push_deg: f64) -> Foot 
         lift,
         strike_deg: 6.0,
         push_deg,
-        heel: DVec3::new(0.0, -0.04, -0.01),
-        ball: DVec3::new(0.0, -0.04, 0.05),
+        heel: DVec3::ZERO,
+        ball: DVec3::new(0.0, -0.012, 0.07),
     }
 }
 
@@ -195,17 +213,20 @@ fn legs(s: &mut Stance, g: &Gait, phase: f64) {
 fn gallop(b: &Bones) -> Clip {
     let g = Gait {
         order: [0.0, 0.09, 0.43, 0.53],
-        hind: paw(0.27, 0.2, 0.1, 0.16, 45.0),
+        hind: paw(0.27, 0.19, 0.1, 0.075, 42.0),
         fore: paw(0.26, 0.2, 0.05, 0.17, 40.0),
         lean_deg: 24.0,
-        fold_deg: 75.0,
+        fold_deg: 42.0,
     };
     clip("gallop", b, 0.56, 24, true, |phase| {
         let wave = |k: f64, at: f64| (TAU * k * (phase - at)).cos();
         let mut s = Stance::rest(b);
         // Gathered in the air with an arched back, stretched out between hind and fore feet.
         let arch = wave(1.0, 0.9);
-        s.shift("hips", DVec3::new(0.0, -0.045 + 0.03 * wave(2.0, 0.39) + 0.012 * wave(1.0, 0.85), 0.02 * arch));
+        s.shift(
+            "hips",
+            DVec3::new(0.0, -0.045 + 0.03 * wave(2.0, 0.39) + 0.012 * wave(1.0, 0.85), 0.02 * arch),
+        );
         s.pose("hips", -13.0 * arch + 7.0 * wave(1.0, 0.62), 0.0, 0.0);
         s.pose("spine 1", 9.0 * arch, 0.0, 0.0);
         s.pose("spine 2", 9.0 * arch, 0.0, 0.0);
@@ -249,7 +270,12 @@ fn walk(b: &Bones) -> Clip {
         }
         for (k, name) in TAIL.into_iter().enumerate() {
             let late = 0.09 * k as f64;
-            s.pose(name, [6.0, 2.0, 0.0, -4.0, -8.0][k] + 2.0 * wave(2.0, 0.2 + late), 8.0 * wave(1.0, 0.15 + late), 0.0);
+            s.pose(
+                name,
+                [6.0, 2.0, 0.0, -4.0, -8.0][k] + 2.0 * wave(2.0, 0.2 + late),
+                8.0 * wave(1.0, 0.15 + late),
+                0.0,
+            );
         }
         legs(&mut s, &g, phase);
         s
@@ -260,7 +286,8 @@ fn idle(b: &Bones) -> Clip {
     clip("idle", b, 4.0, 32, true, |phase| {
         let wave = |k: f64, at: f64| (TAU * k * (phase - at)).cos();
         // A look to the left, a look to the right, and an ear that twitches.
-        let side = ease((phase - 0.12) / 0.1) - 2.0 * ease((phase - 0.42) / 0.14) + ease((phase - 0.8) / 0.12);
+        let side =
+            ease((phase - 0.12) / 0.1) - 2.0 * ease((phase - 0.42) / 0.14) + ease((phase - 0.8) / 0.12);
         let twitch = |at: f64| {
             let u = (phase - at) / 0.09;
             if (0.0..1.0).contains(&u) { (TAU * 2.0 * u).sin() * (1.0 - u) } else { 0.0 }

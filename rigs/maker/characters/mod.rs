@@ -1,8 +1,10 @@
 //! The shipped characters. Each is a function from nothing to files.
 
 mod biped;
+mod bird;
 mod fox;
 mod kit;
+mod koi;
 mod octopus;
 mod robot_arm;
 
@@ -16,5 +18,8 @@ pub struct File {
 
 /// Every file in `rigs/` and `poses/` that the maker builds.
 pub fn all() -> Vec<File> {
-    [robot_arm::files(), octopus::files(), biped::files(), fox::files()].into_iter().flatten().collect()
+    [robot_arm::files(), octopus::files(), biped::files(), fox::files(), bird::files(), koi::files()]
+        .into_iter()
+        .flatten()
+        .collect()
 }

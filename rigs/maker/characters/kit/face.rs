@@ -9,12 +9,14 @@ use std::f64::consts::TAU;
 pub fn eye(m: &mut Machine, bones: &Bones, bone: &str, center: [f64; 3], radius: f64, look: DVec3) {
     let look = look.normalize();
     let center = DVec3::from(center);
-    m.add(bones, bone, "white", ball(radius, 10, 16).along(look).at(center.to_array()));
+    // Small eyes need fewer triangles.
+    let (rings, sides) = if radius < 0.045 { (8, 12) } else { (10, 16) };
+    m.add(bones, bone, "white", ball(radius, rings, sides).along(look).at(center.to_array()));
     // Each disc is a flat ball that looks out of the one behind it.
     let disc = |size: f64, out: f64, toward: DVec3| {
         let flat = DAffine3::from_scale(DVec3::new(0.22, 1.0, 1.0));
         let place = center + toward * (radius * out);
-        ball(radius * size, 6, 16).by(flat).along(toward).at(place.to_array())
+        ball(radius * size, rings / 2 + 1, sides).by(flat).along(toward).at(place.to_array())
     };
     m.add(bones, bone, "iris", disc(0.62, 0.83, look));
     m.add(bones, bone, "pupil", disc(0.4, 0.925, look));

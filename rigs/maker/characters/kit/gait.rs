@@ -17,7 +17,7 @@ pub struct Foot {
     pub strike_deg: f64,
     /// Heel up at take-off, degrees.
     pub push_deg: f64,
-    /// Heel and ball of the foot, below and around the ankle at rest.
+    /// Middles of the round heel and of the ball of the foot, from the ankle at rest.
     pub heel: DVec3,
     pub ball: DVec3,
 }
@@ -40,7 +40,12 @@ impl Foot {
             let u = phase / s;
             let down = 1.0 - ease(u / 0.25);
             let up = ease((u - 0.5) / 0.5);
-            self.step(self.forward + self.reach * (1.0 - 2.0 * u), 0.0, -self.strike_deg * down + self.push_deg * up, up)
+            self.step(
+                self.forward + self.reach * (1.0 - 2.0 * u),
+                0.0,
+                -self.strike_deg * down + self.push_deg * up,
+                up,
+            )
         } else {
             // A cubic from take-off to touch-down that leaves and arrives at the ground's speed.
             let u = (phase - s) / (1.0 - s);
@@ -52,7 +57,7 @@ impl Foot {
                 + slope * (u3 - u2);
             let rise = self.lift * (std::f64::consts::PI * u).sin().powi(2) * (1.4 - 0.8 * u);
             let pitch = self.push_deg + (-self.strike_deg - self.push_deg) * ease(u / 0.9);
-            self.step(self.forward + z, rise, pitch, 1.0 - ease(u / 0.3))
+            self.step(self.forward + z, rise, pitch, 1.0 - ease(u / 0.55))
         }
     }
 
@@ -60,7 +65,9 @@ impl Foot {
     fn step(&self, z: f64, rise: f64, pitch_deg: f64, toes: f64) -> Step {
         let turn = DQuat::from_rotation_x(pitch_deg.to_radians());
         let pivot = if pitch_deg > 0.0 { self.ball } else { self.heel };
-        let ankle = pivot - turn * pivot + DVec3::new(0.0, rise, z);
+        // Skin bulges below bent toes: a millimetre for every ten degrees makes room for it.
+        let room = 1e-4 * pitch_deg.max(0.0);
+        let ankle = pivot - turn * pivot + DVec3::new(0.0, rise + room, z);
         Step { ankle, pitch_deg, toes_deg: -pitch_deg.max(0.0) * toes }
     }
 }

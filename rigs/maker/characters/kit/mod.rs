@@ -4,6 +4,7 @@ pub mod bones;
 pub mod face;
 pub mod field;
 pub mod gait;
+pub mod loft;
 pub mod motion;
 pub mod parts;
 pub mod skin;

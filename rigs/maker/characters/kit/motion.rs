@@ -23,7 +23,12 @@ pub struct Stance<'a> {
 impl<'a> Stance<'a> {
     pub fn rest(bones: &'a Bones) -> Self {
         let n = bones.list.len();
-        Self { bones, turns: vec![DQuat::IDENTITY; n], offsets: vec![DVec3::ZERO; n], scales: vec![DVec3::ONE; n] }
+        Self {
+            bones,
+            turns: vec![DQuat::IDENTITY; n],
+            offsets: vec![DVec3::ZERO; n],
+            scales: vec![DVec3::ONE; n],
+        }
     }
 
     /// Turn a bone further, by degrees about an axis named at rest.
@@ -56,11 +61,6 @@ impl<'a> Stance<'a> {
             None => own,
             Some(p) => self.world_head(p) + self.world_turn(p) * (own - self.bones.heads[p]),
         }
-    }
-
-    /// Where a point of a bone stands.
-    pub fn world_point(&self, bone: usize, rest: DVec3) -> DVec3 {
-        self.world_head(bone) + self.world_turn(bone) * (rest - self.bones.heads[bone])
     }
 
     /// Turn a bone so that it has turned by `g` in the world.
