@@ -3,7 +3,7 @@
 mod architecture;
 #[cfg(feature = "cli")]
 mod cli;
-#[cfg(feature = "io")]
+#[cfg(all(feature = "io", feature = "pictures"))]
 mod corpus;
 mod deform;
 #[cfg(feature = "io")]
@@ -11,5 +11,5 @@ mod gltf;
 #[cfg(feature = "pictures")]
 mod picture;
 mod rng;
-#[cfg(feature = "pictures")]
+#[cfg(all(feature = "io", feature = "pictures"))]
 mod shots;
