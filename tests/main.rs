@@ -1,1 +1,3 @@
 //! What the library promises, a module a subject.
+
+mod raster;
