@@ -152,7 +152,10 @@ fn repair(row: &mut Vec<(u16, f32)>, fallback: u16, report: &mut WeightsReport) 
     let off = (sum - 1.0).abs() as f32;
     report.scaled += usize::from(off > 1e-3);
     report.worst_sum = report.worst_sum.max(off);
-    row.iter_mut().for_each(|r| r.1 = (r.1 as f64 / sum) as f32);
+    // A sum within ε of 1 is as near as rounded weights get: leave them, so that repairing twice changes nothing.
+    if off > f32::EPSILON {
+        row.iter_mut().for_each(|r| r.1 = (r.1 as f64 / sum) as f32);
+    }
     row.sort_by(|a, b| b.1.total_cmp(&a.1));
 }
 
