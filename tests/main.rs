@@ -10,6 +10,7 @@ mod deform;
 mod gltf;
 #[cfg(feature = "pictures")]
 mod picture;
+mod raster;
 mod rng;
 #[cfg(all(feature = "io", feature = "pictures"))]
 mod shots;
