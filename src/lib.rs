@@ -127,3 +127,8 @@ pub mod io;
 
 #[cfg(test)]
 mod test_rng;
+
+/// The examples of the README, run with the others.
+#[cfg(all(doctest, feature = "pictures", feature = "io"))]
+#[doc = include_str!("../README.md")]
+mod readme {}

@@ -13,7 +13,7 @@ const EXAMPLES: &str = "\
 Examples:
   sinew eval fox.glb --rest
   sinew eval fox.glb --clip Run --times 0,0.25,0.5
-  sinew eval rigs/biped.json --times 0
+  sinew eval rigs/pip.json --times 0
 
 Prints one object: {\"schema\":1, \"asset\", \"samples\":[{\"clip\", \"t\", \"nodes\", \"prims\"}]}. Matrices are column-major,
 world_from_node; positions are in world space and in the file's order. Rigs without glTF nodes have \"bones\" instead, each with

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 const EXAMPLES: &str = "\
 Examples:
   sinew info fox.glb
-  sinew info rigs/biped.json --json
+  sinew info rigs/pip.json --json
 
 V, E, F count the surface behind a mesh: vertices at one place are one, degenerate triangles none. A surface is closed when every
 edge has exactly two faces.";

@@ -14,7 +14,7 @@ use std::process::ExitCode;
 
 const EXAMPLES: &str = "\
 Examples:
-  sinew render rigs/biped.json -o walk.gif        a film of one of the shipped characters
+  sinew render rigs/pip.json -o walk.gif        a film of one of the shipped characters
   sinew render fox.glb -o run.####.png --clip Run a numbered sequence of one clip
   sinew info fox.glb                              what is in a file
   sinew eval fox.glb --clip 0 --times 0,0.5       the numbers behind a picture

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
 Examples:
-  sinew render rigs/biped.json -o walk.gif
+  sinew render rigs/pip.json -o walk.gif
   sinew render fox.glb -o fox.png --at 0.5 --size 1024
   sinew render fox.glb -o run.####.png --clip Run --fps 30 --background transparent
   sinew render fox.glb -o part.%04d.png --frames 1-48x2,60
