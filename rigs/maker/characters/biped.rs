@@ -70,7 +70,8 @@ fn look(b: &Bones) -> Look {
     for s in [1.0, -1.0] {
         eye(&mut m, b, "head", [s * 0.083, 1.03, 0.152], 0.062, DVec3::new(s * 0.22, 0.05, 1.0));
     }
-    let smile = arc(DVec3::new(0.0, 0.972, 0.187), DVec3::X * 0.062, DVec3::new(0.0, -0.04, 0.006), 150.0, 11);
+    let smile =
+        arc(DVec3::new(0.0, 0.972, 0.187), DVec3::X * 0.062, DVec3::new(0.0, -0.04, 0.006), 150.0, 11);
     m.add(b, "head", "mouth", cord(&smile, 0.008, 8));
     m.finish(b, &mut look, 180.0);
     look
@@ -154,7 +155,12 @@ fn stride<'a>(b: &'a Bones, g: &Gait, phase: f64) -> Stance<'a> {
     s.pose("spine", g.lean_deg * 0.3, g.twist_deg * wave(1.0, 0.02), 0.2 * g.twist_deg * wave(1.0, mid));
     s.pose("chest", g.lean_deg * 0.3, g.twist_deg * wave(1.0, 0.03), 0.2 * g.twist_deg * wave(1.0, mid));
     s.pose("neck", -g.lean_deg * 0.4, -0.5 * g.twist_deg * wave(1.0, 0.03), 0.0);
-    s.pose("head", -g.lean_deg * 0.5 + 60.0 * g.bob * wave(2.0, g.high + 0.12), -0.4 * g.twist_deg * wave(1.0, 0.04), 0.0);
+    s.pose(
+        "head",
+        -g.lean_deg * 0.5 + 60.0 * g.bob * wave(2.0, g.high + 0.12),
+        -0.4 * g.twist_deg * wave(1.0, 0.04),
+        0.0,
+    );
 
     // Arms swing against the legs; the elbow bends more in front, the hand drags.
     for (side, sign, shift) in [("L", 1.0, 0.5), ("R", -1.0, 0.0)] {
@@ -257,7 +263,11 @@ fn wave(b: &Bones) -> Clip {
         for (side, sign) in [("L", 1.0), ("R", -1.0)] {
             let late = 6.0 * up * osc(6.0, 1.2);
             s.turn(&format!("ear.{side}"), DVec3::Z, late + sign * 6.0 * up);
-            s.turn(&format!("ear tip.{side}"), DVec3::Z, 2.0 * up * osc(6.0, 2.2) + sign * 3.0 * osc(2.0, 0.9));
+            s.turn(
+                &format!("ear tip.{side}"),
+                DVec3::Z,
+                2.0 * up * osc(6.0, 2.2) + sign * 3.0 * osc(2.0, 0.9),
+            );
             plant(&mut s, side, DVec3::ZERO, 0.0, 0.0);
         }
         for (k, name) in ["tail 1", "tail 2", "tail 3"].into_iter().enumerate() {

@@ -94,11 +94,29 @@ fn body(b: &Bones) -> Field {
     f.bone(b, "neck", [0.1, 0.075], 0.07, ORANGE);
     f.egg(id("head"), [0.0, 0.72, 0.47], [0.112, 0.098, 0.11], none, 0.05, ORANGE);
     f.egg(id("head"), [0.0, 0.69, 0.5], [0.13, 0.055, 0.07], none, 0.05, CREAM);
-    f.limb(id("head"), [DVec3::new(0.0, 0.695, 0.55), DVec3::new(0.0, 0.682, 0.675)], [0.055, 0.03], 0.05, ORANGE);
-    f.limb(id("jaw"), [DVec3::new(0.0, 0.655, 0.54), DVec3::new(0.0, 0.652, 0.64)], [0.036, 0.024], 0.03, CREAM);
+    f.limb(
+        id("head"),
+        [DVec3::new(0.0, 0.695, 0.55), DVec3::new(0.0, 0.682, 0.675)],
+        [0.055, 0.03],
+        0.05,
+        ORANGE,
+    );
+    f.limb(
+        id("jaw"),
+        [DVec3::new(0.0, 0.655, 0.54), DVec3::new(0.0, 0.652, 0.64)],
+        [0.036, 0.024],
+        0.03,
+        CREAM,
+    );
     for (k, name) in TAIL.into_iter().enumerate() {
         let r = [0.04, 0.065, 0.085, 0.092, 0.075, 0.03];
-        f.bone(b, name, [r[k], r[k + 1]], if k == 0 { 0.05 } else { 0.01 }, if k < 3 { ORANGE } else { CREAM });
+        f.bone(
+            b,
+            name,
+            [r[k], r[k + 1]],
+            if k == 0 { 0.05 } else { 0.01 },
+            if k < 3 { ORANGE } else { CREAM },
+        );
     }
     for side in ["L", "R"] {
         let n = |name: &str| format!("{name}.{side}");
@@ -205,7 +223,10 @@ fn gallop(b: &Bones) -> Clip {
         let mut s = Stance::rest(b);
         // Gathered in the air with an arched back, stretched out between hind and fore feet.
         let arch = wave(1.0, 0.9);
-        s.shift("hips", DVec3::new(0.0, -0.045 + 0.03 * wave(2.0, 0.39) + 0.012 * wave(1.0, 0.85), 0.02 * arch));
+        s.shift(
+            "hips",
+            DVec3::new(0.0, -0.045 + 0.03 * wave(2.0, 0.39) + 0.012 * wave(1.0, 0.85), 0.02 * arch),
+        );
         s.pose("hips", -13.0 * arch + 7.0 * wave(1.0, 0.62), 0.0, 0.0);
         s.pose("spine 1", 9.0 * arch, 0.0, 0.0);
         s.pose("spine 2", 9.0 * arch, 0.0, 0.0);
@@ -249,7 +270,12 @@ fn walk(b: &Bones) -> Clip {
         }
         for (k, name) in TAIL.into_iter().enumerate() {
             let late = 0.09 * k as f64;
-            s.pose(name, [6.0, 2.0, 0.0, -4.0, -8.0][k] + 2.0 * wave(2.0, 0.2 + late), 8.0 * wave(1.0, 0.15 + late), 0.0);
+            s.pose(
+                name,
+                [6.0, 2.0, 0.0, -4.0, -8.0][k] + 2.0 * wave(2.0, 0.2 + late),
+                8.0 * wave(1.0, 0.15 + late),
+                0.0,
+            );
         }
         legs(&mut s, &g, phase);
         s
@@ -260,7 +286,8 @@ fn idle(b: &Bones) -> Clip {
     clip("idle", b, 4.0, 32, true, |phase| {
         let wave = |k: f64, at: f64| (TAU * k * (phase - at)).cos();
         // A look to the left, a look to the right, and an ear that twitches.
-        let side = ease((phase - 0.12) / 0.1) - 2.0 * ease((phase - 0.42) / 0.14) + ease((phase - 0.8) / 0.12);
+        let side =
+            ease((phase - 0.12) / 0.1) - 2.0 * ease((phase - 0.42) / 0.14) + ease((phase - 0.8) / 0.12);
         let twitch = |at: f64| {
             let u = (phase - at) / 0.09;
             if (0.0..1.0).contains(&u) { (TAU * 2.0 * u).sin() * (1.0 - u) } else { 0.0 }

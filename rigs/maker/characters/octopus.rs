@@ -127,7 +127,8 @@ fn sway(b: &Bones) -> Clip {
         s.pose("mantle 1", 3.0 * wave(1.0, 0.1), 3.0 * wave(1.0, 0.3), 4.0 * wave(1.0, 0.0));
         s.pose("mantle 2", 3.0 * wave(1.0, 0.2), 0.0, 5.0 * wave(1.0, 0.12));
         s.pose("mantle 3", 4.0 * wave(1.0, 0.3), 0.0, 6.0 * wave(1.0, 0.24));
-        s.scales[b.id("mantle 2")] = DVec3::new(1.0 - 0.03 * breath, 1.0 + 0.05 * breath, 1.0 + 0.05 * breath);
+        s.scales[b.id("mantle 2")] =
+            DVec3::new(1.0 - 0.03 * breath, 1.0 + 0.05 * breath, 1.0 + 0.05 * breath);
         for arm in 0..ARMS {
             let own = [0.0, 0.37, 0.71, 0.13, 0.55, 0.88, 0.29, 0.63][arm];
             for joint in 0..JOINTS {
@@ -135,7 +136,11 @@ fn sway(b: &Bones) -> Clip {
                 // Roots stay low, tips lift and curl.
                 let lift = 0.5 + 0.5 * wave(1.0, own + 0.11 * j);
                 s.turn(&bone, curl_axis(arm), [1.0, 4.0, 7.0, 11.0, 16.0, 22.0][joint] * (lift + 0.15));
-                s.turn(&bone, DVec3::Y, [2.0, 4.0, 6.0, 9.0, 12.0, 14.0][joint] * wave(1.0, own + 0.2 + 0.13 * j));
+                s.turn(
+                    &bone,
+                    DVec3::Y,
+                    [2.0, 4.0, 6.0, 9.0, 12.0, 14.0][joint] * wave(1.0, own + 0.2 + 0.13 * j),
+                );
             }
         }
         s

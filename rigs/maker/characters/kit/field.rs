@@ -41,7 +41,9 @@ impl Shape {
     fn bounds(&self) -> (DVec3, DVec3) {
         match self {
             Shape::Limb { a, b, ra, rb } => (a.min(*b) - ra.max(*rb), a.max(*b) + ra.max(*rb)),
-            Shape::Egg { center, radii, .. } => (*center - radii.max_element(), *center + radii.max_element()),
+            Shape::Egg { center, radii, .. } => {
+                (*center - radii.max_element(), *center + radii.max_element())
+            }
         }
     }
 }
@@ -66,7 +68,15 @@ impl Field {
     }
 
     /// An ellipsoid; `turn` is its rotation in the world.
-    pub fn egg(&mut self, bone: usize, center: [f64; 3], radii: [f64; 3], turn: DQuat, blend: f64, color: u32) {
+    pub fn egg(
+        &mut self,
+        bone: usize,
+        center: [f64; 3],
+        radii: [f64; 3],
+        turn: DQuat,
+        blend: f64,
+        color: u32,
+    ) {
         let shape = Shape::Egg { center: center.into(), radii: radii.into(), from_world: turn.conjugate() };
         self.lumps.push(Lump { bone, shape, blend, color: linear(color) });
     }

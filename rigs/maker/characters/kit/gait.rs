@@ -40,7 +40,12 @@ impl Foot {
             let u = phase / s;
             let down = 1.0 - ease(u / 0.25);
             let up = ease((u - 0.5) / 0.5);
-            self.step(self.forward + self.reach * (1.0 - 2.0 * u), 0.0, -self.strike_deg * down + self.push_deg * up, up)
+            self.step(
+                self.forward + self.reach * (1.0 - 2.0 * u),
+                0.0,
+                -self.strike_deg * down + self.push_deg * up,
+                up,
+            )
         } else {
             // A cubic from take-off to touch-down that leaves and arrives at the ground's speed.
             let u = (phase - s) / (1.0 - s);

@@ -23,7 +23,12 @@ pub struct Stance<'a> {
 impl<'a> Stance<'a> {
     pub fn rest(bones: &'a Bones) -> Self {
         let n = bones.list.len();
-        Self { bones, turns: vec![DQuat::IDENTITY; n], offsets: vec![DVec3::ZERO; n], scales: vec![DVec3::ONE; n] }
+        Self {
+            bones,
+            turns: vec![DQuat::IDENTITY; n],
+            offsets: vec![DVec3::ZERO; n],
+            scales: vec![DVec3::ONE; n],
+        }
     }
 
     /// Turn a bone further, by degrees about an axis named at rest.
