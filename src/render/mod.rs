@@ -4,6 +4,8 @@ mod material;
 mod sample;
 mod shade;
 
+// A loop that counts lanes is what becomes one vector instruction; iterators do not always.
+#[allow(clippy::needless_range_loop)]
 pub mod raster;
 
 /// How a picture is made; what is on it is the [`Scene`](crate::scene::Scene).

@@ -141,7 +141,7 @@ fn add(sum: &mut [F8; 4], texel: I8, weight: F8, table: &[f32; 256]) {
         }
         sum[c] = sum[c] + value * weight;
     }
-    let alpha = (texel.shr(24) & I8::splat(255)).to_f32() / F8::splat(255.0);
+    let alpha = (texel.shift_right(24) & I8::splat(255)).to_f32() / F8::splat(255.0);
     sum[3] = sum[3] + alpha * weight;
 }
 

@@ -105,7 +105,7 @@ fn coordinates_of_any_kind_are_survived() {
         let positions: Vec<Vec3> = (0..n)
             .map(|_| {
                 let mut pick = || {
-                    if rng.next() % 3 == 0 {
+                    if rng.next().is_multiple_of(3) {
                         strange[rng.next() as usize % strange.len()]
                     } else {
                         rng.range(-2.0, 2.0)

@@ -136,7 +136,7 @@ fn encode8(c: [F8; 4]) -> I8 {
     }
     if (opaque | clear).bitmask() == 0xff {
         let [r, g, b] = codes(&c);
-        return opaque & (r | g.shl(8) | b.shl(16) | I8::splat(0xff << 24));
+        return opaque & (r | g.shift_left(8) | b.shift_left(16) | I8::splat(0xff << 24));
     }
     let mut out = I8::ZERO;
     for k in 0..8 {
@@ -148,7 +148,7 @@ fn encode8(c: [F8; 4]) -> I8 {
 
 /// `255·(1.055 c^(1/2.4) − 0.055)` as a polynomial in `t = c^(1/4)`, for which it is `t^(5/3)`: interpolated at the Chebyshev
 /// nodes of 0.0031308^(1/4)…1, it is right to 5.7e-4 codes.
-const CURVE: [f32; 7] = [-15.224638, 36.101643, 345.84674, -211.41621, 159.53728, -75.775063, 15.930479];
+const CURVE: [f32; 7] = [-15.224638, 36.101643, 345.84674, -211.41621, 159.53728, -75.77506, 15.930479];
 
 /// Codes nearer to a step than this are looked up in the exact table.
 const DOUBT: f32 = 1e-3;

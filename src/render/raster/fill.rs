@@ -123,11 +123,14 @@ impl Walk {
     #[inline(always)]
     pub fn visit(&self, samples: usize, mut f: impl FnMut(usize, usize, I8, F8)) {
         let (lo, hi) = (F8::splat(self.z_lo), F8::splat(self.z_hi));
+        // What is at most eight pixels wide is walked in one column, wherever it starts.
+        let narrow = self.x[1] - self.x[0] < 8;
+        let first = if narrow { self.x[0].min(TILE as i32 - 8) } else { self.x[0] & !7 };
         for n in 0..samples {
             let along = |k: usize| I8::splat(self.e[n][k]) + I8::IOTA * I8::splat(self.step_x[k]);
             let base = [along(0), along(1), along(2)];
             let z_base = F8::splat(self.z[n]) + I8::IOTA.to_f32() * self.z_x;
-            for x in (self.x[0] & !7..=self.x[1]).step_by(8) {
+            for x in (first..=self.x[1]).step_by(8) {
                 let shift = |k: usize| base[k] + I8::splat(self.step_x[k] * x + self.step_y[k] * self.y[0]);
                 let mut e = [shift(0), shift(1), shift(2)];
                 for y in self.y[0]..=self.y[1] {

@@ -307,9 +307,9 @@ fn group(frame: &Frame, area: Area, [x, y]: [usize; 2], id: u32, own: u64, scrat
             k.0[l] = list[i + l] as i32;
         }
         // Lanes beyond the end repeat the block's first pixel; nobody looks at them.
-        let (column, row) = (k & I8::splat(7), k.shr(3));
+        let (column, row) = (k & I8::splat(7), k.shift_right(3));
         let rgba = shade::<true>(frame, draw, &ids, left + column.to_f32(), top + row.to_f32());
-        let place = row.shl(6) + column + I8::splat((y * TILE + x) as i32);
+        let place = row.shift_left(6) + column + I8::splat((y * TILE + x) as i32);
         let lanes = Lanes { place, mask: [WHOLE; 8], whole: true };
         planes.put(&lanes, count, &rgba);
     }

@@ -136,7 +136,7 @@ struct Share<'a> {
 
 /// Eight triangles: coordinates of their three corners, and which lanes are still of interest.
 struct Group<'a> {
-    tris: &'a [[u32; 3]],
+    tris: &'a [[u32; 3]; 8],
     first: u32,
     x: [I8; 3],
     y: [I8; 3],
@@ -154,18 +154,23 @@ impl Kernel for Share<'_> {
         let n = self.draw.object.positions.len();
         let xy = &self.vertices.xy[self.draw.first_vertex..][..n];
         let mut id = self.from;
-        for tris in list.chunks(8) {
-            self.group(tris, id, xy);
-            id += tris.len() as u32;
+        let (groups, rest) = list.as_chunks::<8>();
+        for tris in groups {
+            self.group(tris, 0xff, id, xy);
+            id += 8;
+        }
+        if let Some(&first) = rest.first() {
+            let mut tris = [first; 8];
+            tris[..rest.len()].copy_from_slice(rest);
+            self.group(&tris, (1 << rest.len()) - 1, id, xy);
         }
     }
 }
 
 impl Share<'_> {
     #[inline(always)]
-    fn group(&mut self, tris: &[[u32; 3]], first: u32, xy: &[[i32; 2]]) {
+    fn group(&mut self, tris: &[[u32; 3]; 8], lanes: u32, first: u32, xy: &[[i32; 2]]) {
         let (x, y) = corners(tris, xy);
-        let lanes = (1u32 << tris.len()) - 1;
 
         // Lanes with a corner outside, or too long for 32-bit products, go one by one.
         let (lo_x, hi_x) = (x[0].min(x[1]).min(x[2]), x[0].max(x[1]).max(x[2]));
@@ -185,8 +190,8 @@ impl Share<'_> {
         let culled = !culled.bitmask() & lanes & !slow;
         let reach = reach(self.frame.samples);
         let ends = |lo: I8, hi: I8, size: i32| {
-            let lo = (lo + I8::splat(127 - reach)).shr(8).max(I8::ZERO);
-            (lo, (hi + I8::splat(reach - 128)).shr(8).min(I8::splat(size - 1)))
+            let lo = (lo + I8::splat(127 - reach)).shift_right(8).max(I8::ZERO);
+            (lo, (hi + I8::splat(reach - 128)).shift_right(8).min(I8::splat(size - 1)))
         };
         let ((lo_x, hi_x), (lo_y, hi_y)) =
             (ends(lo_x, hi_x, self.frame.width), ends(lo_y, hi_y, self.frame.height));
@@ -222,8 +227,8 @@ impl Share<'_> {
         let (x, y) = ([g.x[0], x1, x2], [g.y[0], y1, y2]);
 
         // Edge functions at the first pixel's centre, with the fill rule as a bias; steps of one pixel.
-        let px = g.lo[0].shl(8) + I8::splat(128);
-        let py = g.lo[1].shl(8) + I8::splat(128);
+        let px = g.lo[0].shift_left(8) + I8::splat(128);
+        let py = g.lo[1].shift_left(8) + I8::splat(128);
         let (mut e, mut dx, mut dy, mut bias) = ([I8::ZERO; 3], [I8::ZERO; 3], [I8::ZERO; 3], [I8::ZERO; 3]);
         for k in 0..3 {
             let (a, b) = ([1, 2, 0][k], [2, 0, 1][k]);
@@ -320,15 +325,18 @@ pub(super) fn oriented(
     Some(Setup { x, y, z, id, draw: d })
 }
 
-/// Corners of up to eight triangles, by lane.
+/// Corners of eight triangles, by lane.
 #[inline(always)]
-fn corners(tris: &[[u32; 3]], xy: &[[i32; 2]]) -> ([I8; 3], [I8; 3]) {
+fn corners(tris: &[[u32; 3]; 8], xy: &[[i32; 2]]) -> ([I8; 3], [I8; 3]) {
     let (mut x, mut y) = ([I8::ZERO; 3], [I8::ZERO; 3]);
-    for (k, t) in tris.iter().enumerate().take(8) {
-        for c in 0..3 {
-            let v = xy[t[c] as usize];
-            x[c].0[k] = v[0];
-            y[c].0[k] = v[1];
+    for c in 0..3 {
+        let mut v = [[0; 2]; 8];
+        for k in 0..8 {
+            v[k] = xy[tris[k][c] as usize];
+        }
+        for k in 0..8 {
+            x[c].0[k] = v[k][0];
+            y[c].0[k] = v[k][1];
         }
     }
     (x, y)
