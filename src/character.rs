@@ -6,8 +6,8 @@ use crate::mesh::Mesh;
 use crate::morph::Morphed;
 use crate::pose::Pose;
 use crate::skeleton::{BoneId, Skeleton};
-use crate::skin::{self, Deformed, Method, Weights};
-use glam::{Affine3A, DVec3};
+use crate::skin::{self, Deformed, Method, Rest, Weights};
+use glam::{Affine3A, DVec3, Vec3};
 
 /// A mesh's place in the character.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -245,19 +245,56 @@ impl Character {
         scratch: &mut Scratch,
         out: &mut Deformed,
     ) {
+        let Scratch { morphed, palette, .. } = scratch;
+        let rest = self.morph(instance, pose, morphed);
+        let method = self.palette(instance, posed, center, palette);
+        skin::deform(method, rest, palette, out);
+    }
+
+    /// Positions alone, as [`deform`](Self::deform) gives them.
+    ///
+    /// # Panics
+    /// If `instance`, `pose` or `posed` are not of this character.
+    pub fn positions(
+        &self,
+        instance: usize,
+        pose: &Pose,
+        posed: &Posed,
+        center: DVec3,
+        scratch: &mut Scratch,
+        out: &mut Vec<Vec3>,
+    ) {
+        let Scratch { morphed, palette, deformed } = scratch;
+        let rest = Rest { normals: &[], tangents: &[], ..self.morph(instance, pose, morphed) };
+        let method = self.palette(instance, posed, center, palette);
+        std::mem::swap(&mut deformed.positions, out);
+        skin::deform(method, rest, palette, deformed);
+        std::mem::swap(&mut deformed.positions, out);
+    }
+
+    fn morph<'s>(&'s self, instance: usize, pose: &Pose, morphed: &'s mut Morphed) -> Rest<'s> {
         let inst = &self.instances[instance];
         let mesh = self.mesh(inst);
-        let weights = &pose.weights[inst.first_weight..][..mesh.targets.len()];
-        let rest = scratch.morphed.apply(mesh, weights);
-        scratch.palette.clear();
-        match &inst.binding {
+        morphed.apply(mesh, &pose.weights[inst.first_weight..][..mesh.targets.len()])
+    }
+
+    /// `local_from_mesh` of every bone that drives the instance, and how they drive it.
+    fn palette(
+        &self,
+        instance: usize,
+        posed: &Posed,
+        center: DVec3,
+        palette: &mut Vec<Affine3A>,
+    ) -> Method<'_> {
+        palette.clear();
+        match &self.instances[instance].binding {
             Binding::Bone(b) => {
-                scratch.palette.push(posed.near(*b, center));
-                skin::deform(Method::Rigid(0), rest, &scratch.palette, out);
+                palette.push(posed.near(*b, center));
+                Method::Rigid(0)
             }
-            Binding::Skin { palette, weights } => {
-                scratch.palette.extend(palette.iter().map(|(b, m)| posed.near(*b, center) * *m));
-                skin::deform(Method::Linear(weights), rest, &scratch.palette, out);
+            Binding::Skin { palette: bones, weights } => {
+                palette.extend(bones.iter().map(|(b, m)| posed.near(*b, center) * *m));
+                Method::Linear(weights)
             }
         }
     }
@@ -268,4 +305,5 @@ impl Character {
 pub struct Scratch {
     morphed: Morphed,
     palette: Vec<Affine3A>,
+    deformed: Deformed,
 }

@@ -65,7 +65,7 @@ impl Posed {
 /// pose.set_xzx(&skeleton, of[0], Vec3::new(0.0, std::f32::consts::FRAC_PI_2, 0.0));
 /// let mut posed = fk::Posed::default();
 /// fk::forward(&skeleton, &pose, &mut posed);
-/// assert!((posed.origin(of[1]) - DVec3::Y).length() < 1e-7);
+/// assert!((posed.origin(of[1]) - DVec3::Y).length() < 1e-6);
 /// ```
 ///
 /// # Panics

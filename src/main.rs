@@ -1,1 +1,7 @@
-fn main() {}
+//! The program `sinew`: see `sinew --help`.
+
+mod cli;
+
+fn main() -> std::process::ExitCode {
+    cli::run()
+}

@@ -5,7 +5,7 @@ use crate::skeleton::{BoneId, Skeleton};
 use glam::{DAffine3, Quat, Vec3};
 
 /// Where every bone stands against its parent at one moment.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Default)]
 pub struct Pose {
     /// `parent_from_bone`, `B` of them.
     pub locals: Vec<Trs>,

@@ -2,6 +2,12 @@
 //!
 //! f32 seconds have an ulp of 7.8 ms after a day, so time stays f64 and is wrapped before it becomes local.
 
+mod frame_set;
+mod rate;
+
+pub use frame_set::{FrameSet, FrameSetError, frame_time};
+pub use rate::{Rate, RateError};
+
 /// A closed interval of seconds.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Range {

@@ -1,4 +1,14 @@
 //! What the library promises, a module a subject.
 
+mod architecture;
+#[cfg(feature = "cli")]
+mod cli;
 #[cfg(all(feature = "io", feature = "pictures"))]
 mod corpus;
+mod deform;
+#[cfg(feature = "io")]
+mod gltf;
+#[cfg(feature = "pictures")]
+mod picture;
+mod raster;
+mod rng;

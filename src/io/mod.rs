@@ -7,6 +7,8 @@ pub mod notes;
 #[cfg(feature = "pictures")]
 pub mod picture;
 #[cfg(feature = "io")]
+pub mod ply;
+#[cfg(feature = "io")]
 pub mod rig_json;
 
 use crate::asset::Asset;
@@ -65,4 +67,107 @@ pub struct Import {
     pub extensions: Vec<String>,
     /// Everything that was dropped or repaired.
     pub warnings: Vec<Warning>,
+}
+
+/// Why a file could not be read.
+#[cfg(feature = "io")]
+#[derive(Debug, thiserror::Error)]
+pub enum ImportError {
+    /// The file cannot be opened.
+    #[error("{0}")]
+    Read(#[from] std::io::Error),
+    /// No format that is known.
+    #[error("{0}")]
+    Unknown(String),
+    /// A glTF file.
+    #[error(transparent)]
+    Gltf(#[from] gltf::GltfError),
+    /// A rig of ours.
+    #[error(transparent)]
+    Rig(#[from] rig_json::RigError),
+    /// A rig of the notes.
+    #[error(transparent)]
+    Notes(#[from] notes::NotesError),
+}
+
+/// Read any file that the engine knows; the content decides, not the name.
+///
+/// # Errors
+/// [`ImportError`]; the caller knows which file it named, the message says where in it.
+#[cfg(feature = "io")]
+pub fn import(path: &std::path::Path, options: &Options) -> Result<Import, ImportError> {
+    let bytes = read_file(path)?;
+    let folder = path.parent().unwrap_or(std::path::Path::new(""));
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    match probe(&bytes, &name) {
+        Format::Notes => Ok(notes::import_bytes(&bytes, folder, options)?),
+        Format::Gltf => {
+            let folder = if folder.as_os_str().is_empty() { std::path::Path::new(".") } else { folder };
+            Ok(gltf::import_bytes(&bytes, Some(folder), &path.display().to_string(), options)?)
+        }
+        Format::Rig => Ok(rig_json::import(path, options)?),
+        Format::Unknown(why) => Err(ImportError::Unknown(why)),
+    }
+}
+
+/// All bytes of a plain file; a folder, a pipe or a device is refused, since it may never end.
+///
+/// # Errors
+/// What the system says, or that it is no file.
+#[cfg(feature = "io")]
+pub fn read_file(path: &std::path::Path) -> std::io::Result<Vec<u8>> {
+    let kind = std::fs::metadata(path)?;
+    if kind.is_file() {
+        return std::fs::read(path);
+    }
+    let what = if kind.is_dir() { "a folder" } else { "a pipe or a device" };
+    Err(std::io::Error::other(format!("this is {what}; expected a file")))
+}
+
+#[cfg(feature = "io")]
+enum Format {
+    Gltf,
+    Rig,
+    Notes,
+    Unknown(String),
+}
+
+/// Tell formats apart by their first bytes, then by the keys of their JSON object.
+#[cfg(feature = "io")]
+fn probe(bytes: &[u8], name: &str) -> Format {
+    use serde::de::IgnoredAny;
+
+    #[derive(serde::Deserialize)]
+    struct Keys {
+        sinew_rig: Option<IgnoredAny>,
+        sinew_poses: Option<IgnoredAny>,
+        asset: Option<IgnoredAny>,
+        bones: Option<IgnoredAny>,
+        model: Option<IgnoredAny>,
+    }
+
+    if bytes.starts_with(b"glTF") || name.to_ascii_lowercase().ends_with(".gltf") {
+        return Format::Gltf;
+    }
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    match serde_json::from_slice::<Keys>(text) {
+        Ok(Keys { sinew_rig: Some(_), .. }) => Format::Rig,
+        Ok(Keys { asset: Some(_), .. }) => Format::Gltf,
+        Ok(Keys { bones: Some(_), model: Some(_), .. }) => Format::Notes,
+        Ok(Keys { sinew_poses: Some(_), .. }) => Format::Unknown(
+            "these are poses without a rig; name the rig, and these with --poses".into(),
+        ),
+        Ok(_) => Format::Unknown(
+            "a JSON file without `asset` (glTF), `sinew_rig` (a rig of ours) or `bones` and `model` (a rig of the notes)"
+                .into(),
+        ),
+        Err(e) if text.first().is_some_and(|&b| b == b'{' || b.is_ascii_whitespace()) => {
+            Format::Unknown(format!("JSON that does not parse: {e}"))
+        }
+        Err(_) if bytes.is_empty() => Format::Unknown("the file is empty".into()),
+        Err(_) => Format::Unknown(format!(
+            "expected glTF (.gltf, .glb) or a rig (.json), found bytes that begin with {:02x?}",
+            &bytes[..bytes.len().min(8)]
+        )),
+    }
 }

@@ -2,6 +2,11 @@
 //!
 //! Without the files every test here is reported as ignored; with `SINEW_DATA` set to a missing folder the run fails.
 
+mod gltf_mutations;
+mod gltf_oracle;
+mod invalid;
+mod notes;
+mod sha256;
 mod support;
 
 use libtest_mimic::{Arguments, Trial};
@@ -20,4 +25,13 @@ fn main() {
 type Test = fn(&std::path::Path) -> Result<(), String>;
 
 /// Name and body of every test.
-const TESTS: &[(&str, Test)] = &[];
+const TESTS: &[(&str, Test)] = &[
+    ("gltf_agrees_with_the_oracle", gltf_oracle::run),
+    ("notes::the_robot_arm_is_where_it_should_be", notes::the_robot_arm_is_where_it_should_be),
+    ("notes::closest_segments_rebuild_the_arms_weights", notes::closest_segments_rebuild_the_arms_weights),
+    ("notes::rest_is_the_identity", notes::rest_is_the_identity),
+    ("notes::surfaces_are_counted", notes::surfaces_are_counted),
+    ("notes::cut_rigs_are_refused", notes::cut_rigs_are_refused),
+    ("changed_bytes_never_panic", gltf_mutations::run),
+    ("broken_files_are_refused_politely", invalid::run),
+];

@@ -1,1 +1,148 @@
-//! Under construction.
+//! Pictures to files: PNG, numbered sequences, GIF and APNG.
+//!
+//! Encoding is pure (frame → bytes, on any thread); writing is separate and goes through [`AtomicFile`], so a
+//! half-written picture never carries the name that was asked for.
+//!
+//! ```
+//! use sinew::image::Rgba8;
+//! use sinew::io::picture::{PngLevel, Target, encode_png};
+//! let target = Target::parse("walk/out.####.png").unwrap();
+//! assert_eq!(target.path_of(7).to_str(), Some("walk/out.0007.png"));
+//! let picture = Rgba8 { width: 2, height: 1, data: vec![255, 0, 0, 255, 0, 0, 255, 255] };
+//! assert_eq!(&encode_png(&picture, PngLevel::Fast).unwrap()[1..4], b"PNG");
+//! ```
+
+mod apng;
+mod atomic;
+mod delta;
+mod dither;
+mod film;
+mod gif;
+mod judge;
+mod nearest;
+mod palette;
+mod png;
+mod target;
+
+pub use apng::ApngWriter;
+pub use atomic::{AtomicFile, Folder, cleanup_temporaries};
+pub use dither::{Dither, Indexed, Mapper};
+pub use film::{Film, FilmReport};
+pub use gif::GifWriter;
+pub use judge::{DitherScore, choose_dither};
+pub use palette::Palette;
+pub use png::{PngLevel, encode_png};
+pub use target::{Format, Pattern, Target, TargetError};
+
+use crate::image::Rgba8;
+use std::path::PathBuf;
+
+/// Why a picture was not written.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The buffer is empty, does not match its sides, or is larger than the format can say.
+    #[error(
+        "a picture of {width} × {height} pixels in {bytes} bytes cannot be written as {format}: expected sides \
+         of 1 to {limit} and {width} × {height} × 4 bytes"
+    )]
+    Size {
+        /// Pixels a row.
+        width: usize,
+        /// Rows.
+        height: usize,
+        /// Bytes that the buffer holds.
+        bytes: usize,
+        /// PNG, GIF or APNG.
+        format: &'static str,
+        /// Longest side that the format allows.
+        limit: usize,
+    },
+    /// A film's frame of another size than the film.
+    #[error("frame {frame} of the film is {}, expected {}: every frame must have the same size", sides(.found), sides(.expected))]
+    FrameSize {
+        /// Position in the film, from 1.
+        frame: u32,
+        /// Width and height of the film.
+        expected: [usize; 2],
+        /// Width and height of the frame.
+        found: [usize; 2],
+    },
+    /// A film that got fewer or more frames than it announced.
+    #[error("the film was announced with {expected} frames and got {found}")]
+    FrameCount {
+        /// Frames that were announced.
+        expected: u32,
+        /// Frames that came.
+        found: u32,
+    },
+    /// A GIF's frame cannot be shown so long.
+    #[error(
+        "{rate} frames a second is too slow for GIF, whose longest frame is 655.35 s: expected 0.0016 or more"
+    )]
+    TooSlow {
+        /// Frames a second.
+        rate: crate::time::Rate,
+    },
+    /// The encoder or the stream behind it failed.
+    #[error("{format}: {source}")]
+    Encode {
+        /// PNG, GIF or APNG.
+        format: &'static str,
+        /// What failed.
+        source: std::io::Error,
+    },
+    /// A file is there already.
+    #[error("{}: the file exists already; choose another name, or --force to overwrite it", .path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The name is that of a folder, or of something that is no plain file.
+    #[error("{}: expected a file name, found {found}", .path.display())]
+    NotAFile {
+        /// The name.
+        path: PathBuf,
+        /// `a folder`, `a device or pipe`.
+        found: &'static str,
+    },
+    /// The folder of the file is missing.
+    #[error("{}: the folder {} does not exist; create it first (mkdir -p)", .path.display(), .folder.display())]
+    NoFolder {
+        /// The file.
+        path: PathBuf,
+        /// The folder that is missing.
+        folder: PathBuf,
+    },
+    /// The system refused.
+    #[error("{}: cannot {action}: {source}", .path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// `create the file`, `write`.
+        action: &'static str,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// [`cleanup_temporaries`] ran: the program is about to end, and nothing more is written.
+    #[error("{}: interrupted, nothing was written", .path.display())]
+    Interrupted {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+/// `640 × 480`.
+fn sides(s: &[usize; 2]) -> String {
+    format!("{} × {}", s[0], s[1])
+}
+
+/// Refuse pictures whose buffer does not match their sides, or whose sides the format cannot say.
+fn check_size(picture: &Rgba8, format: &'static str, limit: usize) -> Result<(), Error> {
+    let Rgba8 { width, height, ref data } = *picture;
+    let fits = |n: usize| (1..=limit).contains(&n);
+    let bytes = width.checked_mul(height).and_then(|n| n.checked_mul(4));
+    if fits(width) && fits(height) && bytes == Some(data.len()) {
+        return Ok(());
+    }
+    Err(Error::Size { width, height, bytes: data.len(), format, limit })
+}

@@ -58,8 +58,10 @@ impl Planes {
         if self.by_sample {
             return self.put_samples(lanes, n, rgba);
         }
-        let first = lanes.place[0];
-        if lanes.whole && n == 8 && lanes.place[7] == first + 7 {
+        let first = lanes.place.0[0];
+        // Places of several blocks do not ascend, so that the two ends alone tell nothing.
+        if lanes.whole && n == 8 && lanes.place == I8::splat(first) + I8::IOTA {
+            let first = first as usize;
             for c in 0..4 {
                 rgba[c].store(&mut self.c[c][first..]);
             }
@@ -68,7 +70,7 @@ impl Planes {
         for c in 0..4 {
             let plane: &mut [f32; PLANE] = (&mut self.c[c][..PLANE]).try_into().expect("a tile");
             for k in 0..n {
-                let p = &mut plane[lanes.place[k] % PLANE];
+                let p = &mut plane[lanes.place.0[k] as usize % PLANE];
                 let v = rgba[c].0[k];
                 *p = if lanes.mask[k] == WHOLE { v } else { *p + v * share(lanes.mask[k]) };
             }
@@ -80,7 +82,7 @@ impl Planes {
         for k in 0..n {
             for s in bits(lanes.mask[k] as u32) {
                 for c in 0..4 {
-                    self.c[c][s as usize * PLANE + lanes.place[k]] = rgba[c].0[k];
+                    self.c[c][s as usize * PLANE + lanes.place.0[k] as usize] = rgba[c].0[k];
                 }
             }
         }
@@ -108,7 +110,7 @@ fn share(mask: u8) -> f32 {
 
 /// Places and masks of eight entries.
 pub(super) struct Lanes {
-    place: [usize; 8],
+    place: I8,
     mask: [u8; 8],
     /// All masks are whole.
     whole: bool,
@@ -305,11 +307,8 @@ fn group(frame: &Frame, area: Area, [x, y]: [usize; 2], id: u32, own: u64, scrat
         // Lanes beyond the end repeat the block's first pixel; nobody looks at them.
         let (column, row) = (k & I8::splat(7), k.shr(3));
         let rgba = shade::<true>(frame, draw, &ids, left + column.to_f32(), top + row.to_f32());
-        let at = row.shl(6) + column + I8::splat((y * TILE + x) as i32);
-        let mut lanes = Lanes { place: [0; 8], mask: [WHOLE; 8], whole: true };
-        for l in 0..8 {
-            lanes.place[l] = at.0[l] as usize;
-        }
+        let place = row.shl(6) + column + I8::splat((y * TILE + x) as i32);
+        let lanes = Lanes { place, mask: [WHOLE; 8], whole: true };
         planes.put(&lanes, count, &rgba);
     }
 }
@@ -402,12 +401,12 @@ impl Batch {
         let [left, top] = area.corner(frame);
         let mut ids = [0; 8];
         let (mut px, mut py) = (F8::ZERO, F8::ZERO);
-        let mut lanes = Lanes { place: [0; 8], mask: [0; 8], whole: true };
+        let mut lanes = Lanes { place: I8::ZERO, mask: [0; 8], whole: true };
         for k in 0..8 {
             let e = self.entries[k];
             let c = CENTROIDS[e.mask as usize & 15];
             ids[k] = e.id - draw.first_triangle;
-            lanes.place[k] = e.place as usize;
+            lanes.place.0[k] = e.place as i32;
             lanes.mask[k] = e.mask;
             lanes.whole &= e.mask == WHOLE;
             px.0[k] = left + (e.place as usize % TILE) as f32 + c[0];

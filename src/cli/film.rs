@@ -1,0 +1,212 @@
+//! Frames into files: drawn and encoded by workers, written in order.
+
+use super::{Failure, say::Say};
+use sinew::frames::{FrameStats, Shot, Stop, Worker, in_order};
+use sinew::image::Rgba8;
+use sinew::io::picture::{
+    self, ApngWriter, AtomicFile, Film, Folder, Format, GifWriter, Mapper, Palette, PngLevel, Target,
+    choose_dither, encode_png,
+};
+use sinew::time::Rate;
+use std::path::Path;
+use std::time::Instant;
+
+/// Frames that a palette is made from.
+const PALETTE_FRAMES: usize = 16;
+
+/// What is to be written.
+pub struct Job<'a> {
+    pub shot: &'a Shot<'a>,
+    /// Frame numbers and seconds.
+    pub moments: &'a [(i64, f64)],
+    pub rate: Rate,
+    pub size: [usize; 2],
+    pub transparent: bool,
+    pub target: &'a Target,
+    pub level: PngLevel,
+    pub threads: usize,
+    pub force: bool,
+}
+
+pub fn write(job: &Job, say: &Say) -> Result<(), Failure> {
+    // A temporary must not outlive Ctrl-C; the handler runs on a thread of its own.
+    let _ = ctrlc::set_handler(|| {
+        picture::cleanup_temporaries();
+        std::process::exit(130);
+    });
+    refuse_existing(job)?;
+    let start = Instant::now();
+    let total = match job.target {
+        Target::Still(_) | Target::Sequence(_) => stills(job, say)?,
+        Target::Film(path, Format::Apng) => apng(job, path, say)?,
+        Target::Film(path, _) => gif(job, path, say)?,
+    };
+    let n = job.moments.len();
+    let seconds = start.elapsed().as_secs_f64();
+    say.detail(&format!(
+        "{n} frames in {seconds:.3} s ({:.2} ms each), a frame: {} bones, {} vertices; {:?}",
+        1e3 * seconds / n as f64,
+        total.bones,
+        total.vertices,
+        total.raster
+    ));
+    say.note(&match job.target {
+        Target::Sequence(_) if n > 1 => {
+            let path = |i: usize| job.target.path_of(job.moments[i].0).display().to_string();
+            format!("wrote {n} frames, {} … {}", path(0), path(n - 1))
+        }
+        _ => format!("wrote {}", job.target.path_of(job.moments[0].0).display()),
+    });
+    Ok(())
+}
+
+fn failed(e: picture::Error) -> Failure {
+    Failure::Run(e.to_string())
+}
+
+/// Say so before anything is drawn.
+fn refuse_existing(job: &Job) -> Result<(), Failure> {
+    if job.force {
+        return Ok(());
+    }
+    for (number, _) in job.moments {
+        let path = job.target.path_of(*number);
+        if path.exists() {
+            let message = format!("{}: the file exists; --force overwrites it", path.display());
+            return Err(Failure::Run(message));
+        }
+    }
+    Ok(())
+}
+
+/// Draw all moments in parallel, finish each on its worker, and hand the results on in order.
+fn draw<S, T: Send>(
+    job: &Job,
+    moments: &[(i64, f64)],
+    state: impl Fn() -> S + Sync,
+    finish: impl Fn(&mut S, Rgba8) -> T + Sync,
+    mut receive: impl FnMut(usize, T) -> Result<(), picture::Error>,
+) -> Result<FrameStats, Failure> {
+    let mut fault = None;
+    let mut last = FrameStats::default();
+    let start = || (Worker::default(), state());
+    let one = |(worker, s): &mut (Worker, S), i: usize| {
+        let mut out = Rgba8::default();
+        let stats = job.shot.draw(moments[i].1, worker, &mut out);
+        (stats, finish(s, out))
+    };
+    let done = in_order(moments.len(), job.threads, start, one, |i, (stats, result)| {
+        last = stats;
+        receive(i, result).map_err(|e| {
+            fault = Some(e);
+            Stop
+        })
+    });
+    match (done, fault) {
+        (Ok(()), _) => Ok(last),
+        (_, Some(e)) => Err(failed(e)),
+        (Err(Stop), None) => Err(Failure::Run("drawing stopped".into())),
+    }
+}
+
+fn stills(job: &Job, say: &Say) -> Result<FrameStats, Failure> {
+    let folder = if matches!(job.target, Target::Sequence(_)) { Folder::Create } else { Folder::MustExist };
+    let bar = say.progress(job.moments.len());
+    let stats = draw(
+        job,
+        job.moments,
+        || (),
+        |(), picture| encode_png(&picture, job.level),
+        |i, png| {
+            let path = job.target.path_of(job.moments[i].0);
+            AtomicFile::write(path, &png?, job.force, folder)?;
+            bar.inc(1);
+            Ok(())
+        },
+    );
+    bar.finish_and_clear();
+    stats
+}
+
+fn film(job: &Job) -> Film {
+    Film {
+        size: job.size,
+        frames: job.moments.len() as u32,
+        rate: job.rate,
+        plays: 0,
+        transparent: job.transparent,
+        matte: [255; 3],
+    }
+}
+
+fn apng(job: &Job, path: &Path, say: &Say) -> Result<FrameStats, Failure> {
+    let mut file = AtomicFile::create(path, job.force, Folder::MustExist).map_err(failed)?;
+    let mut writer = ApngWriter::new(&mut file, film(job), job.level).map_err(failed)?;
+    let bar = say.progress(job.moments.len());
+    let stats = draw(
+        job,
+        job.moments,
+        || (),
+        |(), picture| picture,
+        |_, picture| {
+            bar.inc(1);
+            writer.write(&picture)
+        },
+    )?;
+    bar.finish_and_clear();
+    writer.finish().map_err(failed)?;
+    file.commit().map_err(failed)?;
+    Ok(stats)
+}
+
+fn gif(job: &Job, path: &Path, say: &Say) -> Result<FrameStats, Failure> {
+    let film = film(job);
+    let mut file = AtomicFile::create(path, job.force, Folder::MustExist).map_err(failed)?;
+
+    // A few frames, spread over the film, decide on its colours and its dithering.
+    let n = job.moments.len();
+    let few = n.min(PALETTE_FRAMES);
+    let spread: Vec<(i64, f64)> = (0..few).map(|k| job.moments[k * n / few]).collect();
+    let mut samples = Vec::with_capacity(few);
+    draw(
+        job,
+        &spread,
+        || (),
+        |(), picture| picture,
+        |_, picture| {
+            samples.push(picture);
+            Ok(())
+        },
+    )?;
+    let palette = Palette::from_frames(&samples, 256, &film);
+    let (dither, scores) = choose_dither(&samples, &palette, &film);
+    drop(samples);
+    for s in scores {
+        let chosen = if s.dither == dither { ", chosen" } else { "" };
+        let name = s.dither.name();
+        say.detail(&format!("dithering {name}: error {:.3}, flicker {:.3}{chosen}", s.error, s.flicker));
+    }
+
+    let mut writer = GifWriter::new(&mut file, film, &palette, dither).map_err(failed)?;
+    let bar = say.progress(n);
+    let stats = draw(
+        job,
+        job.moments,
+        || Mapper::new(&palette, &film),
+        |mapper, picture| mapper.map(&picture, dither),
+        |_, indexed| {
+            bar.inc(1);
+            writer.write_indexed(indexed)
+        },
+    )?;
+    bar.finish_and_clear();
+    let (_, report) = writer.finish().map_err(failed)?;
+    if report.dropped > 0 {
+        say.note(&format!(
+            "{} frames were too short for GIF; the film's length is right without them",
+            report.dropped
+        ));
+    }
+    file.commit().map_err(failed)?;
+    Ok(stats)
+}

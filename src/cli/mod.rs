@@ -1,0 +1,150 @@
+//! The command line: parse, call the library, print, choose an exit code. No algorithm lives here.
+
+mod eval;
+mod film;
+mod info;
+mod render;
+mod say;
+
+use clap::{CommandFactory, Parser, Subcommand};
+use say::Say;
+use sinew::io::{self, Import, Options};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+const EXAMPLES: &str = "\
+Examples:
+  sinew render rigs/biped.json -o walk.gif        a film of one of the shipped characters
+  sinew render fox.glb -o run.####.png --clip Run a numbered sequence of one clip
+  sinew info fox.glb                              what is in a file
+  sinew eval fox.glb --clip 0 --times 0,0.5       the numbers behind a picture
+
+Exit codes: 0 done, 1 failed while running, 2 wrong usage, 3 bad input file, 130 interrupted.
+The variable NO_COLOR switches colours off.";
+
+/// Character animation: rigged glTF in, right frames out.
+#[derive(Parser)]
+#[command(name = "sinew", version, after_help = EXAMPLES, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    /// Say nothing but errors.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Say more: every warning, what was chosen, what it cost.
+    #[arg(short, long, global = true)]
+    verbose: bool,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Draw a character: one picture, a numbered sequence or a film.
+    Render(render::Args),
+    /// Tell what is in a file: bones, meshes, clips, extensions, warnings.
+    Info(info::Args),
+    /// Print node matrices and vertex positions as JSON.
+    Eval(eval::Args),
+    /// Print a completion script for a shell.
+    #[command(
+        after_help = "Example:\n  sinew completions bash > ~/.local/share/bash-completion/completions/sinew"
+    )]
+    Completions {
+        /// Which shell.
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page (roff).
+    #[command(after_help = "Example:\n  sinew man | man -l -")]
+    Man,
+}
+
+/// What went wrong, and so the exit code.
+enum Failure {
+    /// 1: failed while running.
+    Run(String),
+    /// 2: the command cannot mean anything.
+    Usage(String),
+    /// 3: the input file.
+    Input(String),
+}
+
+/// Parse the arguments and do what they say.
+pub fn run() -> ExitCode {
+    let cli = Cli::parse();
+    let say = Say::new(cli.quiet, cli.verbose);
+    let done = match cli.command {
+        Command::Render(args) => render::run(&args, &say),
+        Command::Info(args) => info::run(&args, &say),
+        Command::Eval(args) => eval::run(&args, &say),
+        Command::Completions { shell } => completions(shell),
+        Command::Man => manual(),
+    };
+    let (code, message) = match done {
+        Ok(()) => return ExitCode::SUCCESS,
+        Err(Failure::Run(m)) => (1, m),
+        Err(Failure::Usage(m)) => (2, m),
+        Err(Failure::Input(m)) => (3, m),
+    };
+    say.error(&message);
+    ExitCode::from(code)
+}
+
+fn completions(shell: clap_complete::Shell) -> Result<(), Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Cli::command(), "sinew", &mut script);
+    print(&script)
+}
+
+fn manual() -> Result<(), Failure> {
+    let mut page = Vec::new();
+    let failed = |e: std::io::Error| Failure::Run(e.to_string());
+    clap_mangen::Man::new(Cli::command()).render(&mut page).map_err(failed)?;
+    for sub in Cli::command().get_subcommands() {
+        clap_mangen::Man::new(sub.clone()).render_options_section(&mut page).map_err(failed)?;
+    }
+    print(&page)
+}
+
+/// Bytes to standard output; a reader that went away (`| head`) is no failure.
+fn print(bytes: &[u8]) -> Result<(), Failure> {
+    use std::io::{ErrorKind, Write};
+    let mut out = std::io::stdout().lock();
+    match out.write_all(bytes).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Failure::Run(format!("standard output: {e}"))),
+        _ => Ok(()),
+    }
+}
+
+/// Read the input, show its warnings.
+fn load(path: &Path, options: Options, say: &Say) -> Result<Import, Failure> {
+    let import =
+        io::import(path, &options).map_err(|e| Failure::Input(format!("{}: {e}", path.display())))?;
+    say.warnings(path, &import.warnings);
+    Ok(import)
+}
+
+/// Read the input and, if poses are named, put them in the place of its clips.
+fn load_posed(path: &Path, poses: Option<&PathBuf>, options: Options, say: &Say) -> Result<Import, Failure> {
+    let mut import = load(path, options, say)?;
+    if let Some(file) = poses {
+        let bad = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", file.display()));
+        let bytes = io::read_file(file).map_err(|e| bad(&e))?;
+        let clips = io::rig_json::poses_from_bytes(&bytes, import.asset.character.skeleton());
+        let clips = clips.map_err(|e| bad(&e))?;
+        let character = std::mem::take(&mut import.asset.character);
+        import.asset.character = character.with_clips(clips).map_err(|e| bad(&e))?;
+    }
+    Ok(import)
+}
+
+/// The clip that `--clip` names: a whole number is an index, anything else a name; the first by default, `None` without clips.
+fn find_clip(import: &Import, asked: Option<&str>) -> Result<Option<usize>, Failure> {
+    let clips = import.asset.character.clips();
+    let Some(asked) = asked else { return Ok((!clips.is_empty()).then_some(0)) };
+    let named = clips.iter().position(|c| c.name == asked);
+    let index = asked.parse::<usize>().ok().filter(|&i| i < clips.len());
+    named.or(index).map(Some).ok_or_else(|| {
+        let names: Vec<String> = clips.iter().enumerate().map(|(i, c)| format!("{i} {}", c.name)).collect();
+        let has = if names.is_empty() { "none".into() } else { names.join(", ") };
+        Failure::Usage(format!("--clip {asked}: no such clip; the file has: {has}"))
+    })
+}

@@ -1,0 +1,71 @@
+//! What the program says on standard error, and in which colour.
+
+use sinew::io::Warning;
+use std::io::IsTerminal;
+use std::path::Path;
+
+/// Warnings shown without `-v`.
+const FEW: usize = 5;
+
+/// How much to say.
+pub struct Say {
+    quiet: bool,
+    pub verbose: bool,
+    color: bool,
+}
+
+impl Say {
+    pub fn new(quiet: bool, verbose: bool) -> Self {
+        let plain = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty());
+        Self { quiet, verbose, color: !plain && std::io::stderr().is_terminal() }
+    }
+
+    pub fn error(&self, message: &str) {
+        eprintln!("{} {message}", self.paint("error:", "1;31"));
+    }
+
+    /// Something worth knowing, shown unless `-q`.
+    pub fn note(&self, message: &str) {
+        if !self.quiet {
+            eprintln!("{message}");
+        }
+    }
+
+    /// Something for the curious, shown with `-v`.
+    pub fn detail(&self, message: &str) {
+        if self.verbose {
+            eprintln!("{message}");
+        }
+    }
+
+    pub fn warnings(&self, file: &Path, warnings: &[Warning]) {
+        if self.quiet {
+            return;
+        }
+        let shown = if self.verbose { warnings.len() } else { FEW };
+        for w in warnings.iter().take(shown) {
+            eprintln!("{} {}: {w}", self.paint("warning:", "1;33"), file.display());
+        }
+        if warnings.len() > shown {
+            eprintln!("… and {} more warnings; -v shows them", warnings.len() - shown);
+        }
+    }
+
+    /// A bar with the time left; nothing where standard error is no terminal.
+    pub fn progress(&self, total: usize) -> indicatif::ProgressBar {
+        use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+        if self.quiet || total < 2 {
+            return ProgressBar::hidden();
+        }
+        let bar = ProgressBar::with_draw_target(Some(total as u64), ProgressDrawTarget::stderr());
+        let style = ProgressStyle::with_template("{pos}/{len} frames [{bar:30}] {elapsed} gone, {eta} left");
+        if let Ok(style) = style {
+            bar.set_style(style);
+        }
+        bar
+    }
+
+    fn paint(&self, text: &str, code: &str) -> String {
+        if self.color { format!("\x1b[{code}m{text}\x1b[0m") } else { text.into() }
+    }
+}

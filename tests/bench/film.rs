@@ -1,0 +1,98 @@
+//! Whole processes side by side: ours and any peer's, taking turns in one run.
+//!
+//! ```text
+//! cargo bench --bench film -- man.glb 48 'filly=python filly_frames.py man.glb 48 /tmp/out' 'f3d=python f3d_frames.py …'
+//! ```
+//!
+//! Each round runs every command once, so a machine that slows down slows all of them. Printed are medians of wall and
+//! processor time over all rounds, the largest resident set of one more run, and the ratios to ours.
+
+use nix::sys::resource::{UsageWho, getrusage};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Instant;
+
+const ROUNDS: usize = 9;
+
+struct Entry {
+    name: String,
+    words: Vec<String>,
+    wall: Vec<f64>,
+    cpu: Vec<f64>,
+}
+
+fn main() {
+    let args: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+    let [asset, frames, peers @ ..] = args.as_slice() else {
+        println!("usage: cargo bench --bench film -- ASSET FRAMES ['NAME=COMMAND' …]");
+        return;
+    };
+    let out = std::env::temp_dir().join(format!("sinew-bench-{}", std::process::id()));
+    let mut entries = vec![ours(asset, frames, &out)];
+    entries.extend(peers.iter().map(|p| entry(p)));
+    for round in 0..=ROUNDS {
+        for e in &mut entries {
+            let (wall, cpu) = run(&e.words);
+            // The first round warms caches.
+            if round > 0 {
+                e.wall.push(wall);
+                e.cpu.push(cpu);
+            }
+        }
+    }
+    report(&mut entries);
+    std::fs::remove_dir_all(&out).ok();
+}
+
+fn ours(asset: &str, frames: &str, out: &Path) -> Entry {
+    let pattern = out.join("f.####.png").display().to_string();
+    let set = format!("1-{frames}");
+    let words = [env!("CARGO_BIN_EXE_sinew"), "render", asset, "-o", &pattern, "--frames", &set, "-f", "-q"];
+    Entry { name: "sinew".into(), words: words.map(String::from).to_vec(), wall: vec![], cpu: vec![] }
+}
+
+fn entry(text: &str) -> Entry {
+    let (name, command) = text.split_once('=').expect("a peer is NAME=COMMAND");
+    let words = command.split_whitespace().map(String::from).collect();
+    Entry { name: name.into(), words, wall: vec![], cpu: vec![] }
+}
+
+/// Wall and processor seconds of one run.
+fn run(words: &[String]) -> (f64, f64) {
+    let cpu = || {
+        let r = getrusage(UsageWho::RUSAGE_CHILDREN).expect("the system counts");
+        let seconds = |t: nix::sys::time::TimeVal| t.tv_sec() as f64 + t.tv_usec() as f64 * 1e-6;
+        seconds(r.user_time()) + seconds(r.system_time())
+    };
+    let (before, start) = (cpu(), Instant::now());
+    let mut command = Command::new(&words[0]);
+    let done = command.args(&words[1..]).stdout(Stdio::null()).stderr(Stdio::null()).status();
+    let wall = start.elapsed().as_secs_f64();
+    assert!(done.is_ok_and(|s| s.success()), "{words:?} failed");
+    (wall, cpu() - before)
+}
+
+/// Megabytes of the largest resident set, by GNU time where it is installed.
+fn peak(words: &[String]) -> Option<f64> {
+    let out = Command::new("/usr/bin/time").args(["-f", "%M"]).args(words).output().ok()?;
+    let text = String::from_utf8_lossy(&out.stderr).into_owned();
+    text.lines().last()?.trim().parse::<f64>().ok().map(|kb| kb / 1024.0)
+}
+
+fn report(entries: &mut [Entry]) {
+    let median = |v: &mut Vec<f64>| {
+        v.sort_by(f64::total_cmp);
+        v[v.len() / 2]
+    };
+    let mut first = (0.0, 0.0);
+    println!("{:10} {:>9} {:>9} {:>9} {:>8} {:>8}", "", "wall s", "cpu s", "peak MB", "× wall", "× cpu");
+    for (i, e) in entries.iter_mut().enumerate() {
+        let (wall, cpu) = (median(&mut e.wall), median(&mut e.cpu));
+        if i == 0 {
+            first = (wall, cpu);
+        }
+        let peak = peak(&e.words).map_or("?".into(), |m| format!("{m:.0}"));
+        let (rw, rc) = (wall / first.0, cpu / first.1);
+        println!("{:10} {wall:9.3} {cpu:9.3} {peak:>9} {rw:8.1} {rc:8.1}", e.name);
+    }
+}

@@ -1,0 +1,192 @@
+//! The program as its users meet it: exit codes, messages, files.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn sinew(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sinew")).args(args).output().expect("the program starts")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// Exit code and standard error.
+fn fails(args: &[&str]) -> (i32, String) {
+    let out = sinew(args);
+    (out.status.code().expect("it exits by itself"), text(&out.stderr))
+}
+
+/// A folder with a rig of one bone and one triangle, waving for a second.
+fn folder() -> (tempfile::TempDir, String) {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let rig = r##"{
+  "sinew_rig": 1,
+  "bones": [{"name": "flag", "head": [0,0,0], "tail": [1,0,0]}],
+  "meshes": [{"name": "cloth", "bind": "closest", "positions": [[0,0,0],[1,0,0],[0,1,0]], "triangles": [[0,1,2]]}],
+  "poses": ["flag.poses.json"]
+}"##;
+    let poses = r##"{"sinew_poses": 1, "clips": [{"name": "wave", "tracks": [
+  {"bone": "flag", "xzx_deg": [[0, 0,0,0], [0.5, 0,40,0], [1, 0,0,0]]}]}]}"##;
+    std::fs::write(dir.path().join("flag.json"), rig).expect("written");
+    std::fs::write(dir.path().join("flag.poses.json"), poses).expect("written");
+    let input = path(&dir, "flag.json");
+    (dir, input)
+}
+
+fn path(dir: &tempfile::TempDir, name: &str) -> String {
+    dir.path().join(name).to_str().expect("UTF-8").to_string()
+}
+
+fn files(dir: &Path) -> Vec<PathBuf> {
+    let mut all: Vec<PathBuf> =
+        std::fs::read_dir(dir).expect("readable").map(|e| e.expect("readable").path()).collect();
+    all.sort();
+    all
+}
+
+#[test]
+fn every_subcommand_explains_itself_with_examples() {
+    for command in ["render", "info", "eval"] {
+        let out = sinew(&[command, "--help"]);
+        assert!(out.status.success() && text(&out.stdout).contains("Examples:"), "{command}");
+    }
+    assert!(text(&sinew(&["completions", "bash"]).stdout).contains("_sinew"));
+    assert!(text(&sinew(&["man"]).stdout).contains(".TH sinew"));
+}
+
+#[test]
+fn wrong_usage_is_2_and_bad_input_is_3() {
+    let (dir, input) = folder();
+    let out = path(&dir, "a.png");
+    for (args, code, says) in [
+        (vec!["render"], 2, "required"),
+        (vec!["render", &input, "-o", "a.jpg"], 2, ".png"),
+        (vec!["render", &input, "-o", &out, "--size", "0"], 2, "16384"),
+        (vec!["render", &input, "-o", &out, "--camera", "yaw=x"], 2, "expected yaw=DEG"),
+        (vec!["render", &input, "-o", &out, "--clip", "dance"], 2, "the file has: 0 wave"),
+        (vec!["render", &input, "-o", &out, "--frames", "1-48x0"], 2, "step"),
+        (vec!["render", &input, "-o", &out, "--frames", "1-2"], 2, "####"),
+        (vec!["render", &input, "-o", &out, "--background", "red"], 2, "#rrggbb"),
+        (vec!["render", "nowhere.glb", "-o", &out], 3, "nowhere.glb"),
+        (vec!["info", dir.path().to_str().unwrap()], 3, "folder"),
+        (vec!["info", "/dev/null"], 3, "expected a file"),
+        (vec!["eval", &input, "--times", "nan"], 2, "seconds"),
+    ] {
+        let (got, message) = fails(&args);
+        assert_eq!(got, code, "{args:?}: {message}");
+        assert!(message.contains(says), "{args:?}: {message}");
+    }
+    assert_eq!(files(dir.path()).len(), 2, "nothing was written");
+}
+
+#[test]
+fn a_file_that_is_none_is_named_with_what_was_found() {
+    let (dir, _) = folder();
+    for (name, bytes, says) in [
+        ("empty.glb", &b""[..], "empty"),
+        ("noise.bin", &b"\x00\x01\x02"[..], "found bytes"),
+        ("other.json", &b"{\"a\": 1}"[..], "sinew_rig"),
+        ("half.json", &b"{\"sinew_rig\": 1,"[..], "line 1"),
+        ("half.glb", &b"glTF\x02\x00\x00\x00"[..], "GLB"),
+    ] {
+        let file = path(&dir, name);
+        std::fs::write(&file, bytes).unwrap();
+        let (code, message) = fails(&["info", &file]);
+        assert_eq!(code, 3, "{name}: {message}");
+        assert!(message.contains(name) && message.contains(says), "{name}: {message}");
+    }
+}
+
+#[test]
+fn stills_sequences_and_films_are_written_whole_and_never_over_what_exists() {
+    let (dir, input) = folder();
+    let out = |name: &str| path(&dir, name);
+    let run = |name: &str, more: &[&str]| {
+        let target = out(name);
+        let mut args = vec!["render", &input, "-o", &target, "--size", "48"];
+        args.extend(more);
+        let o = sinew(&args);
+        assert!(o.status.success(), "{}", text(&o.stderr));
+    };
+    run("still.png", &["--at", "0.5"]);
+    run("seq/f.####.png", &["--fps", "8"]);
+    run("seq/g.%03d.png", &["--frames", "1-5x2,9"]);
+    run("film.gif", &[]);
+    run("film.apng", &["--background", "transparent"]);
+    let names: Vec<String> = files(&dir.path().join("seq"))
+        .iter()
+        .map(|p| p.file_name().unwrap().to_str().unwrap().into())
+        .collect();
+    let mut want: Vec<String> = (1..=8).map(|n| format!("f.{n:04}.png")).collect();
+    want.extend(["g.001.png", "g.003.png", "g.005.png", "g.009.png"].map(String::from));
+    assert_eq!(names, want);
+    assert_eq!(files(dir.path()).len(), 6, "no temporary is left");
+
+    let before = std::fs::read(out("still.png")).unwrap();
+    let (code, message) = fails(&["render", &input, "-o", &out("still.png")]);
+    assert_eq!(code, 1);
+    assert!(message.contains("--force"), "{message}");
+    assert_eq!(std::fs::read(out("still.png")).unwrap(), before);
+    run("still.png", &["--force"]);
+    assert_ne!(std::fs::read(out("still.png")).unwrap(), before);
+}
+
+#[test]
+fn the_same_command_gives_the_same_bytes_on_any_number_of_threads() {
+    let (dir, input) = folder();
+    for name in ["a.png", "a.gif", "a.apng"] {
+        let bytes: Vec<Vec<u8>> = ["1", "2", "7"]
+            .iter()
+            .map(|threads| {
+                let target = path(&dir, name);
+                let o =
+                    sinew(&["render", &input, "-o", &target, "--size", "200x90", "--threads", threads, "-f"]);
+                assert!(o.status.success(), "{}", text(&o.stderr));
+                std::fs::read(target).unwrap()
+            })
+            .collect();
+        assert!(bytes[0] == bytes[1] && bytes[1] == bytes[2], "{name}");
+    }
+}
+
+#[test]
+fn eval_and_info_speak_json() {
+    let (_dir, input) = folder();
+    let out = sinew(&["eval", &input, "--times", "-1,0.5,9", "--json"]);
+    let v: serde_json::Value = serde_json::from_slice(&out.stdout).expect("JSON");
+    assert_eq!(v["schema"], 1);
+    let samples = v["samples"].as_array().unwrap();
+    assert_eq!(samples.len(), 3);
+    let tip = |i: usize| samples[i]["bones"]["0"]["tip"][0].as_f64().unwrap();
+    assert!((tip(0) - 1.0).abs() < 1e-6 && (tip(2) - 1.0).abs() < 1e-6, "times outside hold the ends");
+    assert!((tip(1) - 40_f64.to_radians().cos()).abs() < 1e-6);
+    assert_eq!(samples[0]["prims"][0]["count"], 3);
+
+    let out = sinew(&["info", &input, "--json"]);
+    let v: serde_json::Value = serde_json::from_slice(&out.stdout).expect("JSON");
+    assert_eq!((&v["meshes"][0]["V"], &v["meshes"][0]["closed"]), (&3.into(), &false.into()));
+    assert_eq!(v["clips"][0]["name"], "wave");
+}
+
+#[test]
+fn interrupting_leaves_no_half_file() {
+    let (dir, input) = folder();
+    let target = path(&dir, "long.apng");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_sinew"))
+        .args(["render", &input, "-o", &target, "--size", "1024", "--frames", "1-5000", "-q"])
+        .spawn()
+        .expect("the program starts");
+    // Wait until it has begun to write.
+    for _ in 0..2000 {
+        if files(dir.path()).len() > 2 {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    assert!(files(dir.path()).len() > 2, "it writes beside the target");
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs");
+    assert!(kill.success());
+    assert_eq!(child.wait().expect("it ends").code(), Some(130));
+    assert_eq!(files(dir.path()).len(), 2, "{:?}", files(dir.path()));
+}

@@ -1,0 +1,351 @@
+//! glTF files built here: what the specification allows is read as it means, anything else is an error with a place.
+
+use glam::{DVec3, Vec3};
+use serde_json::{Value, json};
+use sinew::character::{Binding, Scratch};
+use sinew::io::gltf::{GltfError, import_bytes};
+use sinew::io::{Import, Options};
+use sinew::scene::{LightKind, Projection};
+use sinew::skin::Deformed;
+
+/// A GLB with binary data that accessors share: f32 positions of 5 vertices, drawn as a strip, and what else a test appends.
+struct File {
+    json: Value,
+    bin: Vec<u8>,
+}
+
+impl File {
+    fn new() -> Self {
+        let json = json!({
+            "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }],
+            "nodes": [{ "mesh": 0 }], "meshes": [{ "primitives": [{ "attributes": {}, "mode": 5 }] }],
+            "buffers": [], "bufferViews": [], "accessors": []
+        });
+        let mut file = Self { json, bin: Vec::new() };
+        let p = [0., 0., 0., 1., 0., 0., 1., 1., 0., 0., 1., 0., 0., 0., 1.];
+        let positions = file.floats("VEC3", &p);
+        file.json["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = json!(positions);
+        file
+    }
+
+    fn accessor(&mut self, bytes: &[u8], kind: u32, shape: &str, count: usize) -> usize {
+        self.bin.resize(self.bin.len().next_multiple_of(4), 0);
+        let views = self.json["bufferViews"].as_array_mut().unwrap();
+        views.push(json!({ "buffer": 0, "byteOffset": self.bin.len(), "byteLength": bytes.len() }));
+        let view = views.len() - 1;
+        self.bin.extend(bytes);
+        let accessors = self.json["accessors"].as_array_mut().unwrap();
+        accessors.push(json!({ "bufferView": view, "componentType": kind, "type": shape, "count": count }));
+        accessors.len() - 1
+    }
+
+    fn floats(&mut self, shape: &str, values: &[f32]) -> usize {
+        let width = match shape {
+            "SCALAR" => 1,
+            "VEC2" => 2,
+            "VEC3" => 3,
+            "VEC4" => 4,
+            _ => 16,
+        };
+        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        self.accessor(&bytes, 5126, shape, values.len() / width)
+    }
+
+    fn indices(&mut self, values: &[u16]) {
+        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let i = self.accessor(&bytes, 5123, "SCALAR", values.len());
+        self.primitive()["indices"] = json!(i);
+    }
+
+    fn primitive(&mut self) -> &mut Value {
+        &mut self.json["meshes"][0]["primitives"][0]
+    }
+
+    fn bytes(&self) -> Vec<u8> {
+        let mut json = self.json.clone();
+        json["buffers"] = json!([{ "byteLength": self.bin.len() }]);
+        let mut text = json.to_string().into_bytes();
+        text.resize(text.len().next_multiple_of(4), b' ');
+        let mut bin = self.bin.clone();
+        bin.resize(bin.len().next_multiple_of(4), 0);
+        let mut out = b"glTF\x02\0\0\0".to_vec();
+        out.extend((28 + text.len() as u32 + bin.len() as u32).to_le_bytes());
+        for (kind, chunk) in [(b"JSON", &text), (b"BIN\0", &bin)] {
+            out.extend((chunk.len() as u32).to_le_bytes());
+            out.extend(kind);
+            out.extend(chunk);
+        }
+        out
+    }
+
+    fn import(&self) -> Import {
+        self.result().unwrap()
+    }
+
+    fn result(&self) -> Result<Import, GltfError> {
+        import_bytes(&self.bytes(), None, "test.glb", &Options::default())
+    }
+
+    fn error(&self) -> String {
+        self.result().expect_err("an error").to_string()
+    }
+}
+
+fn positions(import: &Import, clip: Option<usize>, t: f64, instance: usize) -> Vec<Vec3> {
+    let c = &import.asset.character;
+    let pose = c.pose(clip, t);
+    let posed = c.posed(&pose);
+    let mut out = Deformed::default();
+    c.deform(instance, &pose, &posed, DVec3::ZERO, &mut Scratch::default(), &mut out);
+    out.positions
+}
+
+#[test]
+fn every_mode_becomes_triangles() {
+    let cases: [(u32, &[[u32; 3]]); 7] = [
+        (0, &[]),
+        (1, &[]),
+        (2, &[]),
+        (3, &[]),
+        (4, &[[0, 1, 2]]),
+        (5, &[[0, 1, 2], [1, 3, 2], [2, 3, 4]]),
+        (6, &[[1, 2, 0], [2, 3, 0], [3, 4, 0]]),
+    ];
+    for (mode, expected) in cases {
+        let mut file = File::new();
+        file.primitive()["mode"] = json!(mode);
+        let import = file.import();
+        let mesh = &import.asset.character.meshes()[0];
+        assert_eq!(mesh.triangles, expected, "mode {mode}");
+        assert_eq!(mesh.positions.len(), 5);
+        assert_eq!(import.warnings.is_empty(), mode >= 5, "mode {mode}: {:?}", import.warnings);
+    }
+}
+
+#[test]
+fn indices_out_of_range_are_named() {
+    let mut file = File::new();
+    file.indices(&[0, 1, 5]);
+    assert_eq!(file.error(), "meshes[0].primitives[0].indices[2]: vertex 5 does not exist; there are 5");
+}
+
+#[test]
+fn accessors_reach_no_further_than_their_bytes() {
+    let mut file = File::new();
+    file.json["accessors"][0]["count"] = json!(6);
+    assert_eq!(file.error(), "accessors[0]: needs bytes up to 72, but bufferViews[0] has 60");
+    file.json["accessors"][0]["count"] = json!(u64::MAX);
+    assert!(matches!(file.result(), Err(GltfError::Bytes { .. })));
+    file.json["accessors"][0].as_object_mut().unwrap().remove("bufferView");
+    assert!(matches!(file.result(), Err(GltfError::TooLarge { .. })));
+    file.json["accessors"][0]["count"] = json!(4);
+    assert_eq!(positions(&file.import(), None, 0.0, 0), [Vec3::ZERO; 4]);
+}
+
+#[test]
+fn integers_normalise_as_the_specification_says() {
+    let mut file = File::new();
+    let bytes = [0x80u8, 0x81, 0x00, 0x00, 0x7f, 0x40, 0x00, 0x00, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
+    let a = file.accessor(&bytes, 5120, "VEC3", 5);
+    file.json["accessors"][a]["normalized"] = json!(true);
+    let view = file.json["accessors"][a]["bufferView"].as_u64().unwrap() as usize;
+    file.json["bufferViews"][view]["byteStride"] = json!(4);
+    file.primitive()["attributes"]["POSITION"] = json!(a);
+    let p = positions(&file.import(), None, 0.0, 0);
+    assert_eq!(p[0], Vec3::new(-1.0, -1.0, 0.0));
+    assert_eq!(p[1], Vec3::new(1.0, 64.0 / 127.0, 0.0));
+}
+
+#[test]
+fn a_sheared_matrix_is_kept_and_a_plain_one_is_taken_apart() {
+    let mut file = File::new();
+    file.json["nodes"][0]["matrix"] = json!([1, 0, 0, 0, 0.5, 1, 0, 0, 0, 0, 1, 0, 7, 0, 0, 1]);
+    let import = file.import();
+    assert!(import.asset.character.skeleton().fixed(sinew::skeleton::BoneId(0)).is_some());
+    assert_eq!(positions(&import, None, 0.0, 0)[3], Vec3::new(7.5, 1.0, 0.0));
+
+    file.json["nodes"][0]["matrix"] = json!([0, 2, 0, 0, 3, 0, 0, 0, 0, 0, 1, 0, 7, 0, 0, 1]);
+    let import = file.import();
+    assert!(import.asset.character.skeleton().fixed(sinew::skeleton::BoneId(0)).is_none());
+    assert!((positions(&import, None, 0.0, 0)[2] - Vec3::new(10.0, 2.0, 0.0)).length() < 1e-5);
+}
+
+#[test]
+fn bones_point_to_their_children() {
+    let mut file = File::new();
+    file.json["nodes"] = json!([
+        { "mesh": 0, "children": [1] }, { "translation": [0, 2, 0], "name": "a" }, { "name": "a" }
+    ]);
+    let import = file.import();
+    let s = import.asset.character.skeleton();
+    assert_eq!(import.nodes, [0, 1, 2]);
+    assert!((s.tip(s.ids().next().unwrap()) - Vec3::Y * 2.0).length() < 1e-6);
+    assert!((s.tip(s.find("a").unwrap()) - Vec3::Y * 2.0).length() < 1e-6, "a leaf goes on");
+    assert!(s.find("a_2").is_some() && import.warnings.len() == 1);
+}
+
+#[test]
+fn nodes_must_be_a_tree() {
+    let mut file = File::new();
+    file.json["nodes"] = json!([{ "mesh": 0, "children": [0] }]);
+    assert!(file.error().contains("own ancestor"), "{}", file.error());
+    file.json["nodes"] = json!([{ "children": [2] }, { "children": [2] }, {}]);
+    assert!(file.error().starts_with("nodes[1].children[0]: "), "{}", file.error());
+    file.json["nodes"] = json!([{ "children": [9] }]);
+    assert_eq!(file.error(), "nodes[0].children[0]: node 9 does not exist; there are 1");
+}
+
+fn skinned() -> File {
+    let mut file = File::new();
+    let joints = [1u8, 0, 0, 0].repeat(5);
+    let weights = [1.0, 0.0, 0.0, 0.0].repeat(5);
+    let (j, w) = (file.accessor(&joints, 5121, "VEC4", 5), file.floats("VEC4", &weights));
+    file.primitive()["attributes"]["JOINTS_0"] = json!(j);
+    file.primitive()["attributes"]["WEIGHTS_0"] = json!(w);
+    file.json["nodes"] = json!([
+        { "mesh": 0, "skin": 0, "translation": [100, 0, 0], "children": [1, 2] },
+        { "translation": [1, 0, 0] }, { "translation": [0, 1, 0] }
+    ]);
+    file.json["skins"] = json!([{ "joints": [1, 2] }]);
+    file
+}
+
+#[test]
+fn a_skin_ignores_its_nodes_transform_and_reads_every_set() {
+    let mut file = skinned();
+    assert_eq!(positions(&file.import(), None, 0.0, 0)[0], Vec3::new(100.0, 1.0, 0.0));
+
+    // A second set of joints, half of the weight each.
+    let (half, joints) = ([0.5, 0.0, 0.0, 0.0].repeat(5), [0u8; 20]);
+    let (j, w) = (file.accessor(&joints, 5121, "VEC4", 5), file.floats("VEC4", &half));
+    file.primitive()["attributes"]["WEIGHTS_0"] = json!(w);
+    file.primitive()["attributes"]["JOINTS_1"] = json!(j);
+    file.primitive()["attributes"]["WEIGHTS_1"] = json!(w);
+    assert_eq!(positions(&file.import(), None, 0.0, 0)[0], Vec3::new(100.5, 0.5, 0.0));
+}
+
+#[test]
+fn skins_that_do_not_hold_are_named() {
+    let mut file = skinned();
+    file.json["skins"][0]["joints"] = json!([1]);
+    assert!(file.error().contains("names bone 1, but the skin has 1"), "{}", file.error());
+    file.json["skins"][0]["joints"] = json!([1, 77]);
+    assert_eq!(file.error(), "skins[0].joints[1]: node 77 does not exist; there are 3");
+    let mut file = skinned();
+    file.primitive()["attributes"].as_object_mut().unwrap().remove("JOINTS_0");
+    let import = file.import();
+    assert!(matches!(import.asset.character.instances()[0].binding, Binding::Bone(_)));
+    assert!(import.warnings[0].message.contains("no joints"), "{:?}", import.warnings);
+}
+
+#[test]
+fn keys_are_sorted_and_bad_ones_named() {
+    let mut file = File::new();
+    let times = file.floats("SCALAR", &[1.0, 0.0, 2.0]);
+    let values = file.floats("VEC3", &[1., 0., 0., 0., 0., 0., 5., 0., 0.]);
+    file.json["animations"] = json!([{
+        "samplers": [{ "input": times, "output": values }],
+        "channels": [{ "sampler": 0, "target": { "node": 0, "path": "translation" } },
+                     { "sampler": 0, "target": { "path": "pointer" } }]
+    }]);
+    let import = file.import();
+    assert_eq!(positions(&import, Some(0), 0.5, 0)[0], Vec3::new(0.5, 0.0, 0.0));
+    assert_eq!(import.warnings.len(), 2, "{:?}", import.warnings);
+    let bad = file.floats("VEC3", &[0., 0., 0., 0., f32::NAN, 0., 5., 0., 0.]);
+    file.json["animations"][0]["samplers"][0]["output"] = json!(bad);
+    let e = file.error();
+    assert!(e.starts_with("animations[0].channels[0]: key 0: its value is not finite"), "{e}");
+}
+
+#[test]
+fn morph_weights_rest_and_move() {
+    let mut file = File::new();
+    let delta = file.floats("VEC3", &[0., 0., 1.].repeat(5));
+    file.primitive()["targets"] = json!([{ "POSITION": delta }, {}]);
+    file.json["meshes"][0]["weights"] = json!([0.25, 0.0]);
+    let times = file.floats("SCALAR", &[0.0, 1.0]);
+    let values = file.floats("SCALAR", &[0.0, 0.0, 1.0, 0.0]);
+    file.json["animations"] = json!([{
+        "samplers": [{ "input": times, "output": values }],
+        "channels": [{ "sampler": 0, "target": { "node": 0, "path": "weights" } }]
+    }]);
+    let import = file.import();
+    assert_eq!(positions(&import, None, 0.0, 0)[0].z, 0.25);
+    assert_eq!(positions(&import, Some(0), 0.5, 0)[0].z, 0.5);
+}
+
+#[test]
+fn required_extensions_must_be_known() {
+    let mut file = File::new();
+    file.json["extensionsRequired"] = json!(["KHR_mesh_quantization", "KHR_materials_sheen"]);
+    assert_eq!(file.import().warnings.len(), 1);
+    file.json["extensionsRequired"] = json!(["EXT_mesh_gpu_instancing"]);
+    assert!(file.error().contains("`EXT_mesh_gpu_instancing` is not supported"), "{}", file.error());
+}
+
+#[test]
+fn cameras_and_lamps_ride_on_bones() {
+    let mut file = File::new();
+    file.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [
+        { "type": "spot", "intensity": 5000.0, "spot": { "outerConeAngle": 0.5 } }, { "type": "directional" } ] } });
+    file.json["cameras"] = json!([{ "type": "perspective", "perspective": { "yfov": 0.7, "znear": 0.1 } }]);
+    let lamp = json!({ "KHR_lights_punctual": { "light": 0 } });
+    file.json["nodes"] = json!([{ "mesh": 0, "camera": 0, "name": "eye", "extensions": lamp }]);
+    let import = file.import();
+    let camera = &import.asset.cameras[0];
+    assert_eq!((camera.name.as_str(), camera.projection), ("eye", Projection::Perspective { fov_y: 0.7 }));
+    let light = &import.asset.lights[0].light;
+    assert!(matches!(light.kind, LightKind::Spot { cos_inner: 1.0, .. }));
+    assert!(light.color.x > 0.0 && light.color.x < 3.0, "{}", light.color);
+}
+
+#[test]
+fn uris_stay_in_their_folder() {
+    let folder = std::env::temp_dir().join(format!("sinew-uri-{}", std::process::id()));
+    let inner = folder.join("in ❤");
+    std::fs::create_dir_all(&inner).unwrap();
+    std::fs::write(folder.join("secret.bin"), [0u8; 60]).unwrap();
+    std::fs::write(inner.join("ü 1.bin"), File::new().bin).unwrap();
+    let try_uri = |uri: &str| {
+        let mut json = File::new().json;
+        json["buffers"] = json!([{ "byteLength": 60, "uri": uri }]);
+        let text = format!("\u{feff}{json}");
+        import_bytes(text.as_bytes(), Some(&inner), "test.gltf", &Options::default())
+            .map_err(|e| e.to_string())
+    };
+    assert!(
+        try_uri("ü%201.bin").is_ok() && try_uri("%C3%BC 1.bin").is_ok() && try_uri("x/../ü 1.bin").is_err()
+    );
+    for uri in
+        ["../secret.bin", "%2e%2e/secret.bin", "..\\secret.bin", "/etc/hostname", "file:///etc/hostname"]
+    {
+        let e = try_uri(uri).unwrap_err();
+        assert!(e.starts_with("buffers[0].uri: the URI"), "{e}");
+    }
+    assert!(try_uri("gone.bin").unwrap_err().contains("cannot read"));
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(folder.join("secret.bin"), inner.join("link.bin")).unwrap();
+        assert!(try_uri("link.bin").unwrap_err().contains("through a link"));
+    }
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn cut_off_anywhere_is_an_error() {
+    let whole = skinned().bytes();
+    for end in 0..whole.len() {
+        let e = import_bytes(&whole[..end], None, "cut", &Options::default()).expect_err("cut off");
+        assert!(!e.to_string().is_empty());
+    }
+}
+
+#[test]
+fn many_nodes_with_large_meshes_do_not_eat_memory() {
+    let mut file = File::new();
+    file.json["meshes"][0]["primitives"] = json!(vec![file.json["meshes"][0]["primitives"][0].clone(); 1000]);
+    file.json["nodes"] = json!(vec![json!({ "mesh": 0 }); 20_000]);
+    file.json["scenes"] = json!([]);
+    file.json.as_object_mut().unwrap().remove("scene");
+    assert!(matches!(file.result(), Err(GltfError::TooLarge { .. })));
+}

@@ -1,0 +1,162 @@
+//! What colour it is.
+
+use super::*;
+use glam::DVec3;
+use sinew::scene::LightKind;
+
+fn point(position: Vec3, falloff: Option<f32>) -> Light {
+    Light { kind: LightKind::Point { position, falloff }, color: Vec3::ONE }
+}
+
+/// A lit square seen from two metres; the middle pixel of three shows the origin.
+fn plate(lights: Vec<Light>) -> Stage {
+    let plate = Material {
+        diffuse: Vec4::new(0.5, 0.25, 0.125, 1.0),
+        specular: Vec3::splat(0.5),
+        shininess: 8.0,
+        ..Default::default()
+    };
+    let camera = perspective(Vec3::Z * 2.0, Vec3::ZERO, 0.3);
+    let mut stage = Stage::of(camera, Mesh::new(quad(1.0, 0.0)).unwrap(), plate);
+    (stage.ambient, stage.lights) = (Vec3::splat(0.1), lights);
+    stage
+}
+
+fn middle(stage: &Stage) -> [f32; 4] {
+    let (picture, stats) = stage.linear(3, 1);
+    assert_eq!((stats.samples, stats.shaded), (9, 9));
+    picture.pixels[4]
+}
+
+fn near(found: [f32; 4], want: [f64; 4]) {
+    for c in 0..4 {
+        assert!((found[c] as f64 - want[c]).abs() < 2e-6, "{found:?} {want:?}");
+    }
+}
+
+#[test]
+fn a_lit_plane_has_the_values_of_the_formula() {
+    // Light from 45°: n·l = cos 45°, n·h = cos 22.5°.
+    let (diffuse, specular) = (0.5f64.sqrt(), 0.5 * 22.5f64.to_radians().cos().powi(8));
+    let want = |gain: f64| {
+        let c = |k: f64| 0.1 * k + gain * (k * diffuse + specular);
+        [c(0.5), c(0.25), c(0.125), 1.0]
+    };
+    near(middle(&plate(vec![point(Vec3::new(1.0, 0.0, 1.0), None)])), want(1.0));
+    let direction = Vec3::new(-1.0, 0.0, -1.0).normalize();
+    let sun = Light { kind: LightKind::Directional { direction }, color: Vec3::ONE };
+    near(middle(&plate(vec![sun])), want(1.0));
+    near(middle(&plate(vec![sun, sun])), {
+        let (one, none) = (want(1.0), want(0.0));
+        [0, 1, 2, 3].map(|c| if c == 3 { 1.0 } else { 2.0 * one[c] - none[c] })
+    });
+
+    // 1/d² at d² = 2, faded out towards a range of 2 m: 1 − (2/4)² = 3/4.
+    near(middle(&plate(vec![point(Vec3::new(1.0, 0.0, 1.0), Some(2.0))])), want(0.5 * 0.75));
+
+    // A spot whose axis is 45° off: half of the way from outer to inner, squared.
+    let cos = 0.5f32.sqrt();
+    let kind = LightKind::Spot {
+        position: Vec3::new(1.0, 0.0, 1.0),
+        direction: Vec3::NEG_Z,
+        falloff: None,
+        cos_inner: cos + 0.1,
+        cos_outer: cos - 0.1,
+    };
+    near(middle(&plate(vec![Light { kind, color: Vec3::ONE }])), want(0.25));
+}
+
+#[test]
+fn light_from_behind_makes_no_highlight() {
+    near(middle(&plate(vec![point(Vec3::new(0.0, 0.0, -1.0), None)])), [0.05, 0.025, 0.0125, 1.0]);
+}
+
+#[test]
+fn the_back_of_a_double_sided_surface_is_lit_from_its_own_side() {
+    let mut stage = plate(vec![point(Vec3::new(1.0, 0.0, 1.0), None)]);
+    let front = middle(&stage);
+    stage.materials[0].double_sided = true;
+    assert_eq!(middle(&stage), front);
+    let mut data = quad(1.0, 0.0);
+    data.triangles = vec![[0, 2, 1], [0, 3, 2]];
+    data.normals = vec![Vec3::NEG_Z; 4];
+    stage.meshes[0].0 = Mesh::new(data).unwrap();
+    assert_eq!(middle(&stage), front);
+}
+
+#[test]
+fn a_plate_with_a_spheres_normals_shades_like_the_sphere() {
+    const CELLS: usize = 48;
+    let mut data = MeshData::default();
+    let at = |i: usize| i as f32 / CELLS as f32 * 1.2 - 0.6;
+    for j in 0..=CELLS {
+        for i in 0..=CELLS {
+            let (x, y) = (at(i), at(j));
+            data.positions.push(Vec3::new(x, y, 0.0));
+            data.normals.push(Vec3::new(x, y, (1.0 - x * x - y * y).sqrt()));
+        }
+    }
+    for a in (0..CELLS).flat_map(|j| (0..CELLS).map(move |i| (j * (CELLS + 1) + i) as u32)) {
+        let b = a + CELLS as u32 + 1;
+        data.triangles.extend([[a, a + 1, b + 1], [a, b + 1, b]]);
+    }
+    let direction = -DVec3::new(0.5, 0.7, 0.6).normalize();
+    let mut stage = Stage::of(from_front(5.0, 1.2), Mesh::new(data).unwrap(), Material::default());
+    stage.materials[0].specular = Vec3::splat(0.5);
+    stage.lights =
+        vec![Light { kind: LightKind::Directional { direction: direction.as_vec3() }, color: Vec3::ONE }];
+    let (picture, _) = stage.linear(200, 1);
+    for (k, p) in picture.pixels.iter().enumerate() {
+        let at = |i: usize| (i as f64 + 0.5) / 200.0 * 1.2 - 0.6;
+        let (x, y) = (at(k % 200), -at(k / 200));
+        let n = DVec3::new(x, y, (1.0 - x * x - y * y).sqrt());
+        let (n_l, n_h) = (n.dot(-direction), n.dot((DVec3::Z - direction).normalize()));
+        let want = if n_l > 0.0 { 0.8f32 as f64 * n_l + 0.5 * n_h.max(0.0).powi(32) } else { 0.0 };
+        assert!((p[0] as f64 - want).abs() < 1.0 / 255.0, "{x} {y}: {p:?} {want}");
+    }
+}
+
+#[test]
+fn emission_and_faces_without_normals() {
+    let mut stage = plate(vec![]);
+    stage.materials[0].emissive = Vec3::new(0.0, 2.0, 0.0);
+    near(middle(&stage), [0.05, 2.025, 0.0125, 1.0]);
+}
+
+#[test]
+fn what_blends_goes_over_what_lies_behind_in_linear_light() {
+    // Red behind, half of green before it, a quarter of blue before that; listed in the wrong order.
+    let mut stage = Stage::of(
+        from_front(5.0, 2.0),
+        Mesh::new(quad(1.0, 0.0)).unwrap(),
+        material(Vec4::new(1.0, 0.0, 0.0, 1.0)),
+    );
+    stage.materials.push(blending(Vec3::Z, 0.25));
+    stage.materials.push(blending(Vec3::Y, 0.5));
+    stage.meshes.push((Mesh::new(quad(1.0, 2.0)).unwrap(), 1));
+    stage.meshes.push((Mesh::new(quad(1.0, 1.0)).unwrap(), 2));
+    stage.meshes.push((Mesh::new(quad(1.0, -1.0)).unwrap(), 2));
+    for samples in [1, 4] {
+        let (picture, stats) = stage.linear(16, samples);
+        assert!(picture.pixels.iter().all(|p| *p == [0.375, 0.375, 0.25, 1.0]), "{:?}", picture.pixels[0]);
+        // At 4 samples both triangles are shaded where they meet. What lies behind is not shaded at all.
+        assert_eq!(stats.shaded, 3 * if samples == 1 { 256 } else { 256 + 16 });
+    }
+    // Over nothing, alpha stays: premultiplied in linear light, straight in bytes.
+    stage.meshes = vec![stage.meshes[2].clone()];
+    assert!(stage.linear(16, 4).0.pixels.iter().all(|p| *p == [0.0, 0.5, 0.0, 0.5]));
+    assert_eq!(stage.bytes(16, 4).0.data[..4], [0, 255, 0, 128]);
+}
+
+#[test]
+fn transparent_neighbours_leave_no_seam() {
+    let mut rng = Rng(4);
+    for _ in 0..20 {
+        let mut data = quad(1.0, 0.0);
+        data.positions.push(Vec3::new(rng.range(-0.9, 0.9), rng.range(-0.9, 0.9), 0.0));
+        data.uvs[0].clear();
+        data.triangles = vec![[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]];
+        let stage = Stage::of(from_front(5.0, 2.0), Mesh::new(data).unwrap(), blending(Vec3::ONE, 0.5));
+        assert!(stage.linear(32, 4).0.pixels.iter().all(|p| *p == [0.5; 4]));
+    }
+}
