@@ -12,3 +12,5 @@ mod gltf;
 mod picture;
 mod raster;
 mod rng;
+#[cfg(feature = "pictures")]
+mod shots;

@@ -12,7 +12,7 @@ use crate::fk::{self, Posed};
 use crate::image::Rgba8;
 use crate::pose::Pose;
 use crate::render::Settings;
-use crate::render::raster::{Rasterizer, Stats};
+use crate::render::raster::{IdImage, Rasterizer, Stats};
 use crate::scene::{Camera, Light, LightKind, Material, Object, Scene};
 use crate::skin::Deformed;
 use glam::{Affine3A, DVec3, Vec3};
@@ -88,6 +88,18 @@ impl<'a> Shot<'a> {
         worker.deform(self.asset, self.center);
         let scene = self.scene(&worker.posed, &worker.deformed);
         let raster = worker.rasterizer.draw(&scene, &self.settings, out);
+        let vertices = worker.deformed.iter().map(|d| d.positions.len()).sum();
+        FrameStats { bones: worker.posed.len(), vertices, raster }
+    }
+
+    /// Which object and triangle is seen at the centre of each pixel of the moment `t`, and how far away.
+    ///
+    /// Objects are the character's mesh instances, in order.
+    pub fn draw_ids(&self, t: f64, worker: &mut Worker, out: &mut IdImage) -> FrameStats {
+        worker.evaluate(self.asset, self.clip, t);
+        worker.deform(self.asset, self.center);
+        let scene = self.scene(&worker.posed, &worker.deformed);
+        let raster = worker.rasterizer.draw_ids(&scene, &self.settings, out);
         let vertices = worker.deformed.iter().map(|d| d.positions.len()).sum();
         FrameStats { bones: worker.posed.len(), vertices, raster }
     }
