@@ -12,5 +12,5 @@ mod gltf;
 mod picture;
 mod raster;
 mod rng;
-#[cfg(feature = "pictures")]
+#[cfg(all(feature = "io", feature = "pictures"))]
 mod shots;

@@ -16,7 +16,8 @@ fn rigs() -> Vec<(String, Import)> {
     files.retain(|f| f.extension().is_some_and(|e| e == "json"));
     files.sort();
     let load = |f: &PathBuf| {
-        let import = io::import(f, &Options { textures: true }).unwrap_or_else(|e| panic!("{}: {e}", f.display()));
+        let import =
+            io::import(f, &Options { textures: true }).unwrap_or_else(|e| panic!("{}: {e}", f.display()));
         (f.file_stem().expect("a name").to_string_lossy().into_owned(), import)
     };
     files.iter().map(load).collect()
@@ -64,7 +65,8 @@ fn check(what: &str, picture: &Rgba8, ids: &IdImage) {
 fn threads_do_not_change_a_byte() {
     for (name, import) in &rigs() {
         let picture = |samples, threads| {
-            let shot = Shot::new(&import.asset, Some(0), VIEW, [0.1, 0.2, 0.3, 1.0], settings(samples, threads));
+            let shot =
+                Shot::new(&import.asset, Some(0), VIEW, [0.1, 0.2, 0.3, 1.0], settings(samples, threads));
             let mut out = Rgba8::default();
             shot.unwrap().draw(0.3, &mut Worker::default(), &mut out);
             out

@@ -177,6 +177,8 @@ impl Area {
 pub(super) fn resolve(frame: &Frame, area: Area, by_sample: bool, scratch: &mut TileScratch) {
     scratch.planes.clear(frame.scene.background, by_sample && frame.samples == 4);
     scratch.entries.list.clear();
+    // What was found for another scene means nothing here.
+    scratch.last_draw = LastDraw::default();
     for y in (0..area.h).step_by(8) {
         for x in (0..area.w).step_by(8) {
             block(frame, area, [x, y], scratch);
