@@ -96,12 +96,11 @@ fn plume(b: &Bones, bone: &str, width: f64) -> kit::parts::Solid {
 
 /// Quills, and three rows of coverts that hide their roots.
 fn wing(b: &Bones, m: &mut Machine, s: f64, side: &str) {
-    for k in 0..QUILLS.len() {
+    for (k, (carrier, root, tip)) in QUILLS.into_iter().enumerate() {
         let bone = format!("quill {}.{side}", k + 1);
         let color = if k < 2 { "navy" } else { "blue" };
         m.add(b, &bone, color, plume(b, &bone, if k < 4 { 0.062 } else { 0.068 }));
         // A covert on top of each quill, bound to the bone that carries it.
-        let (carrier, root, tip) = QUILLS[k];
         let (root, tip) = (DVec3::from(root), DVec3::from(tip));
         let mirror = DVec3::new(s, 1.0, 1.0);
         let row = |from: f64, to: f64, up: f64| {

@@ -262,7 +262,7 @@ fn walk(b: &Bones) -> Clip {
         s.pose("hips", 1.5 * wave(2.0, 0.1), -5.0 * wave(1.0, 0.0), 4.0 * wave(1.0, 0.8));
         s.pose("spine 1", 0.0, 3.0 * wave(1.0, 0.05), -1.5 * wave(1.0, 0.8));
         s.pose("spine 2", 0.0, 3.0 * wave(1.0, 0.1), -2.0 * wave(1.0, 0.8));
-        s.pose("chest", -1.0 * wave(2.0, 0.1), -3.0 * wave(1.0, 0.25), -2.0 * wave(1.0, 0.05));
+        s.pose("chest", -wave(2.0, 0.1), -3.0 * wave(1.0, 0.25), -2.0 * wave(1.0, 0.05));
         s.pose("neck", 6.0 + 2.5 * wave(2.0, 0.1), 1.5 * wave(1.0, 0.25), 0.0);
         s.pose("head", -4.0 - 2.0 * wave(2.0, 0.18), 1.0 * wave(1.0, 0.25), 1.5 * wave(1.0, 0.0));
         for (side, sign) in [("L", 1.0), ("R", -1.0)] {

@@ -99,7 +99,7 @@ fn track(out: &mut String, t: &Track) {
         for (i, row) in rows.iter().enumerate() {
             let _ = write!(out, "{}\n          {}", if i == 0 { "" } else { "," }, json(row));
         }
-        out.push_str("]");
+        out.push(']');
     }
     out.push('}');
 }

@@ -110,6 +110,78 @@ fn a_loop_runs_over_its_seam_without_a_kink() {
     assert!(open.contains("the last key of a loop must repeat the first"), "{open}");
 }
 
+/// Two bones in a row along x, a box's worth of room for a mesh.
+fn with_mesh(mesh: &str) -> Result<Import, RigError> {
+    read(&format!(
+        r#"{{"sinew_rig": 1, "bones": [
+        {{"name": "a", "head": [0,0,0], "tail": [1,0,0]}},
+        {{"name": "b", "parent": "a", "translation": [1,0,0], "length": 1}}], "meshes": [{mesh}]}}"#
+    ))
+}
+
+#[test]
+fn parts_follow_the_closest_bone_also_where_creases_split_them() {
+    // Two triangles that meet at a right angle near b, one triangle near a.
+    let mesh = r#"{"name": "m", "bind": "closest", "crease_deg": 30,
+        "positions": [[1.2,0,0],[1.8,0,0],[1.2,0.1,0],[1.2,0,0.1],[0.2,0,0],[0.4,0,0],[0.2,0.1,0]],
+        "triangles": [[0,1,2],[0,3,1],[4,5,6]]}"#;
+    let c = with_mesh(mesh).unwrap().asset.character;
+    // The two corners on the sharp edge are there twice.
+    assert_eq!(c.meshes()[0].positions.len(), 9);
+    let crate::character::Binding::Skin { palette, weights } = &c.instances()[0].binding else {
+        panic!("no skin")
+    };
+    for (v, p) in c.meshes()[0].positions.iter().enumerate() {
+        let bone = palette[weights.of(v).next().unwrap().0].0;
+        assert_eq!(c.skeleton().name(bone), if p.x < 1.0 { "a" } else { "b" });
+    }
+}
+
+#[test]
+fn weights_that_do_not_sum_to_one_are_scaled_with_a_warning() {
+    let mesh = r#"{"name": "m", "bind": {"weights": {"bones": ["b", "a"], "vertices": [[[0,2]], [[0,1],[1,1]], []]}},
+        "positions": [[0,0,0],[1,0,0],[0,1,0]], "triangles": [[0,1,2]]}"#;
+    let warnings = with_mesh(mesh).unwrap().warnings;
+    assert_eq!(warnings.len(), 2, "{warnings:?}");
+    assert_eq!(
+        warnings[0].to_string(),
+        "mesh `m`: 2 vertices had weights that did not sum to 1 and were scaled"
+    );
+    assert!(warnings[1].to_string().contains("1 vertices had no weights"));
+}
+
+#[test]
+fn offsets_start_from_rest_and_channels_exclude_each_other() {
+    let skeleton = read(ARM).unwrap().asset.character.skeleton().clone();
+    let clip = |track: &str| {
+        let text = format!(
+            r#"{{"sinew_poses": 1, "clips": [{{"name": "c", "tracks": [{{"bone": "hand", {track}}}]}}]}}"#
+        );
+        poses_from_bytes(text.as_bytes(), &skeleton)
+    };
+    let moved = clip(r#""offset": [[0, 0.5, 0, 0]]"#).unwrap();
+    assert_eq!(moved[0].tracks[0].curve.value(0), [1.5, 0.0, 0.0]);
+    let both = clip(r#""offset": [[0, 0.5, 0, 0]], "scale": [[0, 1, 1, 1]]"#).unwrap_err().to_string();
+    assert!(both.contains("keys of exactly one of"), "{both}");
+    let short = clip(r#""xzx_deg": [[0, 0.5, 0]]"#).unwrap_err().to_string();
+    assert!(
+        short.contains("key 0 of `xzx_deg`: expected 4 numbers (a time and 3 values), found 3"),
+        "{short}"
+    );
+    let back = clip(r#""scale": [[1, 1, 1, 1], [0, 1, 1, 1]]"#).unwrap_err().to_string();
+    assert!(back.contains("key 1: its time 0 s is before"), "{back}");
+}
+
+#[test]
+fn paths_stay_inside_the_project() {
+    for good in ["x.png", "../poses/x.json", "./a/../b.png", "a/../../poses/x.json"] {
+        assert!(inside_project(good).is_ok(), "{good}");
+    }
+    for bad in ["", "/etc/passwd", "../../x", "a/../../../x", "c:\\x", "..\\x", "file://x"] {
+        assert!(inside_project(bad).is_err(), "{bad}");
+    }
+}
+
 #[test]
 fn broken_files_are_errors() {
     let mut rng = Rng::new(5);

@@ -56,7 +56,7 @@ pub fn feather(base: DVec3, tip: DVec3, up: DVec3, width: f64, thickness: f64) -
     let along = tip - base;
     let up = (up - along * (up.dot(along) / along.length_squared())).normalize();
     let side = along.cross(up).normalize();
-    let n = 5;
+    let n = 4;
     let ring = |t: f64| {
         // Quickly wide, longest at two thirds, round at the tip; a little cupped.
         let w = width * (1.0 - (1.0 - (t * 2.2).min(1.0)).powi(2)).sqrt() * (1.0 - t.powi(5)).sqrt();
