@@ -76,7 +76,7 @@ fn identity_palettes_leave_positions_bitwise_alone_and_one_hot_linear_is_rigid_b
 fn linear_blending_collapses_as_its_formula_says() {
     // A twist by θ between two bones: the middle has radius r·cos(θ/2) (MEASURED: .924, .707, .383, .087).
     let p = [Vec3::new(2.0, 1.0, 0.0)];
-    for (deg, radius) in [(45_f32, 0.9239), (90.0, 0.7071), (135.0, 0.3827), (170.0, 0.0872)] {
+    for (deg, radius) in [(45_f32, 0.92388), (90.0, 0.5_f32.sqrt()), (135.0, 0.38268), (170.0, 0.08716)] {
         let w = blend(&p);
         let twist = Affine3A::from_rotation_x(deg.to_radians());
         let out = run(Method::Linear(&w), &p, &[], &[Affine3A::IDENTITY, twist]);
