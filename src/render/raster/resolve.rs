@@ -6,10 +6,11 @@
 use super::fill::NONE;
 use super::frame::{Draw, Frame, ROTATED};
 use super::setup::bits;
-use super::surface::Shade;
+use super::surface::{self, Shade};
 use super::tile::TileScratch;
 use super::{Stats, TILE};
 use crate::math::simd::{F8, I8};
+use glam::Vec4;
 
 /// Samples of a whole tile.
 const PLANE: usize = TILE * TILE;
@@ -300,6 +301,7 @@ fn group(frame: &Frame, area: Area, [x, y]: [usize; 2], id: u32, own: u64, scrat
     let [left, top] = area.corner(frame);
     let (left, top) = (F8::splat(left + x as f32), F8::splat(top + y as f32));
     let ids = [id - draw.first_triangle; 8];
+    let known = surface::corners_of(frame, draw, ids[0]);
     for i in (0..n).step_by(8) {
         let count = (n - i).min(8);
         let mut k = I8::ZERO;
@@ -308,7 +310,8 @@ fn group(frame: &Frame, area: Area, [x, y]: [usize; 2], id: u32, own: u64, scrat
         }
         // Lanes beyond the end repeat the block's first pixel; nobody looks at them.
         let (column, row) = (k & I8::splat(7), k.shift_right(3));
-        let rgba = shade::<true>(frame, draw, &ids, left + column.to_f32(), top + row.to_f32());
+        let (px, py) = (left + column.to_f32(), top + row.to_f32());
+        let rgba = Shade::<true> { frame, draw, ids: &ids, known: &known, px, py }.color();
         let place = row.shift_left(6) + column + I8::splat((y * TILE + x) as i32);
         let lanes = Lanes { place, mask: [WHOLE; 8], whole: true };
         planes.put(&lanes, count, &rgba);
@@ -316,8 +319,8 @@ fn group(frame: &Frame, area: Area, [x, y]: [usize; 2], id: u32, own: u64, scrat
 }
 
 #[inline(always)]
-fn shade<const ONE: bool>(frame: &Frame, draw: &Draw, ids: &[u32; 8], px: F8, py: F8) -> [F8; 4] {
-    Shade::<ONE> { frame, draw, ids, px, py }.color()
+fn shade(frame: &Frame, draw: &Draw, ids: &[u32; 8], px: F8, py: F8) -> [F8; 4] {
+    Shade::<false> { frame, draw, ids, known: &[Vec4::ZERO; 3], px, py }.color()
 }
 
 /// Mean position of the samples of a mask, pixels from the centre: it lies within the triangle that covers them.
@@ -414,7 +417,7 @@ impl Batch {
             px.0[k] = left + (e.place as usize % TILE) as f32 + c[0];
             py.0[k] = top + (e.place as usize / TILE) as f32 + c[1];
         }
-        let rgba = shade::<false>(frame, draw, &ids, px, py);
+        let rgba = shade(frame, draw, &ids, px, py);
         planes.put(&lanes, n, &rgba);
         self.n = 0;
     }
@@ -463,7 +466,7 @@ pub(super) fn shade_list(
             px.0[k] = left + (l.place as usize % TILE) as f32 + c[0];
             py.0[k] = top + (l.place as usize / TILE) as f32 + c[1];
         }
-        let rgba = shade::<false>(frame, draw, &ids, px, py);
+        let rgba = shade(frame, draw, &ids, px, py);
         for k in 0..n {
             out.push([rgba[0].0[k], rgba[1].0[k], rgba[2].0[k], rgba[3].0[k]]);
         }

@@ -23,12 +23,13 @@ struct Seen<'a, const ONE: bool> {
 }
 
 impl<'a, const ONE: bool> Seen<'a, ONE> {
-    /// The points of triangles `ids` that pixels show; `px`, `py` from the picture's centre.
+    /// The points of triangles `ids` that pixels show; `px`, `py` from the picture's centre. `known` are the picture
+    /// coordinates of the corners if there is one triangle only.
     ///
     /// With `cᵢ = (xᵢ − px·wᵢ, yᵢ − py·wᵢ)`, `bᵢ ∝ eᵢ = cⱼ × cₖ` (Olano and Greer 1997): no division by `w`, so corners
     /// behind the eye do no harm, and no clipped corner is ever needed.
     #[inline(always)]
-    fn new(frame: &Frame, draw: &'a Draw, ids: &[u32; 8], px: F8, py: F8) -> Self {
+    fn new(frame: &Frame, draw: &'a Draw, ids: &[u32; 8], known: &[Vec4; 3], px: F8, py: F8) -> Self {
         let triangles = &draw.object.mesh.triangles;
         let mut corner = [[0; 8]; 3];
         for k in 0..if ONE { 1 } else { 8 } {
@@ -38,9 +39,12 @@ impl<'a, const ONE: bool> Seen<'a, ONE> {
         let (mut p, mut clip) = ([V8::ZERO; 3], [[F8::ZERO; 3]; 3]);
         for i in 0..3 {
             p[i] = vectors::<ONE>(draw.object.positions, &corner[i]);
-            let m = &frame.project;
-            let [x, y, w] =
-                [Projector::row8(m.x, p[i]), Projector::row8(m.y, p[i]), Projector::row8(m.w, p[i])];
+            let [x, y, w] = if ONE {
+                [F8::splat(known[i].x), F8::splat(known[i].y), F8::splat(known[i].w)]
+            } else {
+                let m = &frame.project;
+                [Projector::row8(m.x, p[i]), Projector::row8(m.y, p[i]), Projector::row8(m.w, p[i])]
+            };
             clip[i] = [x - px * w, y - py * w, w];
         }
         let e = [cross(&clip[1], &clip[2]), cross(&clip[2], &clip[0]), cross(&clip[0], &clip[1])];
@@ -232,12 +236,19 @@ fn vectors<const ONE: bool>(list: &[Vec3], at: &[u32; 8]) -> V8 {
     V8::gather(v)
 }
 
+/// Homogeneous picture coordinates of a triangle's corners.
+pub(super) fn corners_of(frame: &Frame, draw: &Draw, id: u32) -> [Vec4; 3] {
+    draw.object.mesh.triangles[id as usize].map(|v| frame.project.point(draw.object.positions[v as usize]))
+}
+
 /// Eight points to be shaded.
 pub(super) struct Shade<'a, const ONE: bool> {
     pub frame: &'a Frame<'a>,
     pub draw: &'a Draw<'a>,
     /// Triangles, counted in the draw.
     pub ids: &'a [u32; 8],
+    /// Its corners, by [`corners_of`], if it is one triangle.
+    pub known: &'a [Vec4; 3],
     /// Where, pixels from the picture's centre.
     pub px: F8,
     pub py: F8,
@@ -257,7 +268,7 @@ impl<const ONE: bool> Kernel for Shade<'_, ONE> {
 
     #[inline(always)]
     fn run(self) -> [F8; 4] {
-        let seen = Seen::<ONE>::new(self.frame, self.draw, self.ids, self.px, self.py);
+        let seen = Seen::<ONE>::new(self.frame, self.draw, self.ids, self.known, self.px, self.py);
         let (c, alpha) = material::light(self.frame.isa, self.frame.scene, self.draw.material, &seen);
         if self.draw.class != Class::Blend {
             return [c.x, c.y, c.z, alpha];
@@ -287,7 +298,8 @@ impl Kernel for Present<'_> {
 
     #[inline(always)]
     fn run(self) -> I8 {
-        let seen = Seen::<true>::new(self.frame, self.draw, &[self.id; 8], self.px, self.py);
+        let known = corners_of(self.frame, self.draw, self.id);
+        let seen = Seen::<true>::new(self.frame, self.draw, &[self.id; 8], &known, self.px, self.py);
         material::present(self.frame.isa, self.frame.scene, self.draw.material, &seen)
     }
 }
