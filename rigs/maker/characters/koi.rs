@@ -202,7 +202,7 @@ fn fins_of(b: &Bones, look: &mut Look) {
         let z = 0.12 - 0.42 * u;
         let t = (0.57 - z) / 1.23;
         let back = LEVEL + girth(t).2 + girth(t).0 - 0.012;
-        let tall = 0.035 + 0.085 * (1.0 - u).powf(0.7) * ease(u / 0.16 + 0.15);
+        let tall = 0.035 + 0.085 * (1.0 - u).powf(0.7) * ease(u / 0.3 + 0.1);
         DVec3::new(0.0, back + tall * v, z - 0.07 * v)
     });
     fin(b, look, "dorsal fin", dorsal, |q, p| {
@@ -215,7 +215,8 @@ fn fins_of(b: &Bones, look: &mut Look) {
         let n = |name: &str| format!("{name}.{side}");
         let paddle = |root: DVec3, tip: DVec3, across: DVec3| {
             move |u: f64, v: f64| {
-                let width = 0.35 + 0.85 * (v * 2.4).sin().max(0.0).powf(0.8) * (1.0 - 0.35 * v);
+                let round = 0.12 + 0.88 * (1.0 - v.powi(4)).sqrt();
+                let width = round * (0.35 + 0.85 * (v * 2.4).sin().max(0.0).powf(0.8) * (1.0 - 0.35 * v));
                 let p =
                     root.lerp(tip, v) + across * ((u - 0.5) * width) - across.normalize() * (0.03 * v * v);
                 DVec3::new(p.x * s, p.y, p.z)

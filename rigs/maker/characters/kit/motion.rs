@@ -105,6 +105,12 @@ fn axes(along: DVec3, normal: DVec3) -> DQuat {
     DQuat::from_mat3(&DMat3::from_cols(x, z.cross(x), z)).normalize()
 }
 
+/// Finest steps in one of a clip's own: near rest a bone's twists may turn so fast that it needs more keys.
+const FINE: usize = 4;
+
+/// How far a rotation halfway between two keys may be off before a bone gets twice as many, radians.
+const TOLERANCE: f64 = 0.002;
+
 /// Sample `stance` at `n` equal steps of a clip of `seconds`; its argument runs from 0 to 1. A loop ends as it begins.
 pub fn clip<'a>(
     name: &str,
@@ -114,14 +120,17 @@ pub fn clip<'a>(
     repeats: bool,
     stance: impl Fn(f64) -> Stance<'a>,
 ) -> Clip {
-    let phase = |k: usize| if repeats && k == n { 0.0 } else { k as f64 / n as f64 };
-    let samples: Vec<Stance> = (0..=n).map(|k| stance(phase(k))).collect();
-    let time = |k: usize| round(seconds * k as f64 / n as f64, 4);
+    let fine = n * FINE;
+    let phase = |k: usize| if repeats && k == fine { 0.0 } else { k as f64 / fine as f64 };
+    let samples: Vec<Stance> = (0..=fine).map(|k| stance(phase(k))).collect();
+    let time = |k: usize| round(seconds * k as f64 / fine as f64, 4);
+    let coarse: Vec<(f64, &Stance)> =
+        samples.iter().enumerate().step_by(FINE).map(|(k, s)| (time(k), s)).collect();
     let mut tracks = Vec::new();
     for bone in 0..bones.list.len() {
         tracks.extend(rotation_track(bones, bone, &samples, &time));
-        tracks.extend(offset_track(bones, bone, &samples, &time));
-        tracks.extend(scale_track(bones, bone, &samples, &time));
+        tracks.extend(offset_track(bones, bone, &coarse));
+        tracks.extend(scale_track(bones, bone, &coarse));
     }
     Clip {
         name: name.into(),
@@ -138,55 +147,73 @@ fn rotation_track(
     samples: &[Stance],
     time: &dyn Fn(usize) -> f64,
 ) -> Option<Track> {
+    // Turns in the bone's own frame, and the coarsest keys that follow them.
     let frame = bones.frames[bone];
-    let mut previous = [0.0; 3];
-    let mut rows = Vec::new();
-    for (k, s) in samples.iter().enumerate() {
-        let local = frame.conjugate() * s.turns[bone] * frame;
-        let theta = euler::xzx_from_rotation_f64(local, Some(previous));
-        previous = if k == 0 { tame(theta) } else { euler::unwrap_xzx(theta, previous) };
-        let mut row = vec![time(k)];
-        row.extend(previous.map(|a| round(a.to_degrees(), 2)));
-        rows.push(row);
-    }
+    let turns: Vec<DQuat> = samples.iter().map(|s| frame.conjugate() * s.turns[bone] * frame).collect();
+    let good = |step: &usize| *step == 1 || midway_error(&turns, &triples(&turns, *step), *step) < TOLERANCE;
+    let step = [4, 2, 1].into_iter().find(good).unwrap_or(1);
+
+    let row = |(k, theta): (usize, &[f64; 3])| {
+        let mut row = vec![time(k * step)];
+        row.extend(theta.map(|a| round(a.to_degrees(), 2)));
+        row
+    };
+    let rows: Vec<Vec<f64>> = triples(&turns, step).iter().enumerate().map(row).collect();
     let moves = rows.iter().any(|r| r[1..].iter().any(|a| a.abs() > 0.0));
     let rows = if constant(&rows) { rows[..1].to_vec() } else { rows };
     moves.then(|| Track { bone: bones.list[bone].name.clone(), xzx_deg: Some(rows), ..Default::default() })
 }
 
-/// Of the two triples of a first key, the one with the smaller twist.
-fn tame(theta: [f64; 3]) -> [f64; 3] {
-    euler::unwrap_xzx(theta, [0.0, 0.0, 0.0])
+/// Unwrapped triples of every `step`-th turn.
+fn triples(turns: &[DQuat], step: usize) -> Vec<[f64; 3]> {
+    let mut out: Vec<[f64; 3]> = Vec::new();
+    for q in turns.iter().step_by(step) {
+        let previous = out.last().copied().unwrap_or_default();
+        let theta = euler::xzx_from_rotation_f64(*q, Some(previous));
+        out.push(euler::unwrap_xzx(theta, previous));
+    }
+    out
 }
 
-fn offset_track(
-    bones: &Bones,
-    bone: usize,
-    samples: &[Stance],
-    time: &dyn Fn(usize) -> f64,
-) -> Option<Track> {
+/// The largest angle, halfway between two keys of a loop, between the turns and the Catmull-Rom curve through the keys.
+fn midway_error(turns: &[DQuat], triples: &[[f64; 3]], step: usize) -> f64 {
+    // Keys beyond the ends lie across the seam, whole turns away.
+    let last = triples.len() - 1;
+    let key = |k: usize, i: usize| match k {
+        0 => triples[last - 1][i] - (triples[last][i] - triples[0][i]),
+        k if k > last + 1 => triples[1][i] + (triples[last][i] - triples[0][i]),
+        k => triples[k - 1][i],
+    };
+    let error = |k: usize| {
+        let at = |i| (9.0 * (key(k + 1, i) + key(k + 2, i)) - key(k, i) - key(k + 3, i)) / 16.0;
+        let d = euler::rotation_from_xzx_f64([0, 1, 2].map(at)).conjugate() * turns[k * step + step / 2];
+        2.0 * d.xyz().length().atan2(d.w.abs())
+    };
+    (0..last).map(error).fold(0.0, f64::max)
+}
+
+fn offset_track(bones: &Bones, bone: usize, samples: &[(f64, &Stance)]) -> Option<Track> {
     let parent = bones.parents[bone].map_or(DQuat::IDENTITY, |p| bones.frames[p]);
-    let mut rows = Vec::new();
-    for (k, s) in samples.iter().enumerate() {
-        let local = parent.conjugate() * s.offsets[bone];
-        let mut row = vec![time(k)];
-        row.extend(local.to_array().map(|x| round(x, 4)));
-        rows.push(row);
-    }
-    let moves = rows.iter().any(|r| r[1..].iter().any(|a| a.abs() > 0.0));
-    let rows = if constant(&rows) { rows[..1].to_vec() } else { rows };
+    let rows = rows(samples, |s| parent.conjugate() * s.offsets[bone]);
+    let moves = rows.iter().any(|r| r[1..].iter().any(|x| *x != 0.0));
     moves.then(|| Track { bone: bones.list[bone].name.clone(), offset: Some(rows), ..Default::default() })
 }
 
-fn scale_track(bones: &Bones, bone: usize, samples: &[Stance], time: &dyn Fn(usize) -> f64) -> Option<Track> {
-    let row = |(k, s): (usize, &Stance)| {
-        let mut row = vec![time(k)];
-        row.extend(s.scales[bone].to_array().map(|x| round(x, 4)));
-        row
-    };
-    let rows: Vec<Vec<f64>> = samples.iter().enumerate().map(row).collect();
+fn scale_track(bones: &Bones, bone: usize, samples: &[(f64, &Stance)]) -> Option<Track> {
+    let rows = rows(samples, |s| s.scales[bone]);
     let moves = rows.iter().any(|r| r[1..].iter().any(|x| *x != 1.0));
     moves.then(|| Track { bone: bones.list[bone].name.clone(), scale: Some(rows), ..Default::default() })
+}
+
+/// One key a sample, or a single one if nothing changes.
+fn rows(samples: &[(f64, &Stance)], value: impl Fn(&Stance) -> DVec3) -> Vec<Vec<f64>> {
+    let row = |(t, s): &(f64, &Stance)| {
+        let mut row = vec![*t];
+        row.extend(value(s).to_array().map(|x| round(x, 4)));
+        row
+    };
+    let rows: Vec<Vec<f64>> = samples.iter().map(row).collect();
+    if constant(&rows) { rows[..1].to_vec() } else { rows }
 }
 
 fn constant(rows: &[Vec<f64>]) -> bool {
