@@ -22,9 +22,33 @@ pub(super) fn chain(width: u32, height: u32, rgba: Vec<u8>, srgb: bool) -> Vec<V
     levels
 }
 
+/// Linear light of each 8-bit sRGB code in 65535ths.
+static LINEAR16: LazyLock<[u32; 256]> =
+    LazyLock::new(|| std::array::from_fn(|i| (LINEAR_OF_SRGB8[i] * 65535.0 + 0.5) as u32));
+
 fn half_srgb(from: &[u8], w: usize, h: usize) -> Vec<u8> {
+    if w.is_multiple_of(2) && h.is_multiple_of(2) && from.as_chunks::<4>().0.iter().all(|t| t[3] == 255) {
+        return half_opaque(from, w);
+    }
     let (linear, codes) = (&*LINEAR_OF_SRGB8, &**CODES);
     half(from, w, h, |c| linear[c as usize], |v| codes[(v * 65535.0 + 0.5) as usize & 0xffff])
+}
+
+/// The plain mean of four opaque texels: most pictures have even sides and no holes, and this takes a third of the time.
+fn half_opaque(from: &[u8], w: usize) -> Vec<u8> {
+    let (linear, codes) = (&*LINEAR16, &**CODES);
+    let mut out = Vec::with_capacity(from.len() / 4);
+    for rows in from.chunks_exact(8 * w) {
+        let (upper, lower) = rows.split_at(4 * w);
+        for (a, b) in upper.as_chunks::<8>().0.iter().zip(lower.as_chunks::<8>().0) {
+            let mean = |c: usize| {
+                let sum: u32 = [a[c], a[c + 4], b[c], b[c + 4]].iter().map(|&v| linear[v as usize]).sum();
+                codes[(sum as usize + 2) / 4]
+            };
+            out.extend_from_slice(&[mean(0), mean(1), mean(2), 255]);
+        }
+    }
+    out
 }
 
 fn half_linear(from: &[u8], w: usize, h: usize) -> Vec<u8> {
@@ -85,6 +109,17 @@ mod tests {
         // sRGB of one half is 187.5.
         assert_eq!(levels[1], [188, 188, 188, 255]);
         assert_eq!(chain(2, 1, vec![0, 10, 0, 255, 255, 20, 255, 255], false)[1], [128, 15, 128, 255]);
+    }
+
+    #[test]
+    fn the_short_way_agrees_with_the_long_one() {
+        let picture: Vec<u8> = (0..64 * 32)
+            .flat_map(|i| [i * 7 % 256, i * 13 % 251, i * i % 256, 255].map(|v| v as u8))
+            .collect();
+        let (linear, codes) = (&*LINEAR_OF_SRGB8, &**CODES);
+        let long = half(&picture, 64, 32, |c| linear[c as usize], |v| codes[(v * 65535.0 + 0.5) as usize]);
+        let off = half_srgb(&picture, 64, 32).iter().zip(&long).map(|(a, b)| a.abs_diff(*b)).max();
+        assert!(off <= Some(1), "{off:?}");
     }
 
     #[test]
