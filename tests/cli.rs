@@ -170,6 +170,17 @@ fn eval_and_info_speak_json() {
 }
 
 #[test]
+fn a_skeleton_without_triangles_is_drawn_empty_with_a_warning() {
+    let (dir, _) = folder();
+    let bare = path(&dir, "bare.json");
+    std::fs::write(&bare, r#"{"sinew_rig": 1, "bones": [{"name": "a", "head": [0,0,0], "tail": [1,0,0]}]}"#)
+        .unwrap();
+    let out = sinew(&["render", &bare, "-o", &path(&dir, "bare.png"), "--size", "16"]);
+    assert!(out.status.success());
+    assert!(text(&out.stderr).contains("no triangles"), "{}", text(&out.stderr));
+}
+
+#[test]
 fn interrupting_leaves_no_half_file() {
     let (dir, input) = folder();
     let target = path(&dir, "long.apng");

@@ -3,6 +3,7 @@
 #[path = "../rigs/maker/characters/mod.rs"]
 mod maker;
 
+use crate::rng::Rng;
 use glam::{DVec3, Vec3};
 use sinew::asset::Asset;
 use sinew::character::{Binding, Character, Scratch};
@@ -247,21 +248,9 @@ fn a_planted_foot_runs_backwards_at_the_grounds_speed() {
     }
 }
 
-/// A small generator (xorshift64*), so that a failure can be repeated.
-struct Dice(u64);
-
-impl Dice {
-    fn below(&mut self, n: usize) -> usize {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 33) as usize % n
-    }
-}
-
 #[test]
 fn broken_files_give_errors_and_never_panic() {
-    let mut dice = Dice(41);
+    let mut dice = Rng::new(41);
     let nothing = |_: &str| Err(std::io::ErrorKind::NotFound.into());
     let options = Options { textures: false };
     for path in files("rigs", "json") {

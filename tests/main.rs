@@ -11,6 +11,7 @@ mod gltf;
 #[cfg(feature = "pictures")]
 mod picture;
 mod raster;
+#[path = "../src/test_rng.rs"]
 mod rng;
 #[cfg(all(feature = "io", feature = "pictures"))]
 mod shots;

@@ -106,6 +106,11 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     let moments = moments(args, &import.asset, clip, &target)?;
     target.check_frames(moments.len()).map_err(|e| usage(&e))?;
 
+    let character = &import.asset.character;
+    if character.instances().iter().all(|i| character.mesh(i).triangles.is_empty()) {
+        say.warn(&format!("{}: there are no triangles; the picture will be empty", args.input.display()));
+    }
+
     // One picture is drawn by all threads, many by one thread each.
     let alone = moments.len() == 1;
     let settings = Settings { threads: if alone { threads } else { 1 }, ..settings };
@@ -172,7 +177,6 @@ fn find_view(asset: &Asset, text: &str) -> Result<View, Failure> {
             }
         }
     }
-    // Straight up or down leaves a horizon to speak of only just off the pole.
     Ok(View::Orbit { yaw: yaw.to_radians(), pitch: pitch.to_radians(), fov_y: fov.to_radians() })
 }
 

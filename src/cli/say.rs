@@ -24,6 +24,12 @@ impl Say {
         eprintln!("{} {message}", self.paint("error:", "1;31"));
     }
 
+    pub fn warn(&self, message: &str) {
+        if !self.quiet {
+            eprintln!("{} {message}", self.paint("warning:", "1;33"));
+        }
+    }
+
     /// Something worth knowing, shown unless `-q`.
     pub fn note(&self, message: &str) {
         if !self.quiet {
@@ -44,7 +50,7 @@ impl Say {
         }
         let shown = if self.verbose { warnings.len() } else { FEW };
         for w in warnings.iter().take(shown) {
-            eprintln!("{} {}: {w}", self.paint("warning:", "1;33"), file.display());
+            self.warn(&format!("{}: {w}", file.display()));
         }
         if warnings.len() > shown {
             eprintln!("… and {} more warnings; -v shows them", warnings.len() - shown);

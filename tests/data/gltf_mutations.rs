@@ -1,5 +1,6 @@
 //! Real files with bytes changed, cut off, or filled in: an asset or an error, never a panic.
 
+use crate::rng::Rng;
 use sinew::character::Scratch;
 use sinew::io::{Options, gltf};
 use sinew::skin::Deformed;
@@ -20,7 +21,7 @@ const FILES: &[&str] = &[
 
 pub fn run(data: &Path) -> Result<(), String> {
     let rounds = std::env::var("ROUNDS").ok().and_then(|r| r.parse().ok()).unwrap_or(120);
-    let mut rng = Rng(0x5eed);
+    let mut rng = Rng::new(0x5eed);
     for name in FILES {
         let whole = pack(&data.join("gltf").join(name))?;
         try_import(&whole).map_err(|e| format!("{name}: {e}"))?;
@@ -108,21 +109,4 @@ fn pack(path: &Path) -> Result<Vec<u8>, String> {
         out.extend(chunk);
     }
     Ok(out)
-}
-
-/// SplitMix64.
-struct Rng(u64);
-
-impl Rng {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.next() % n.max(1) as u64) as usize
-    }
 }

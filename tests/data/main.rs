@@ -6,6 +6,8 @@ mod gltf_mutations;
 mod gltf_oracle;
 mod invalid;
 mod notes;
+#[path = "../../src/test_rng.rs"]
+mod rng;
 mod sha256;
 mod support;
 

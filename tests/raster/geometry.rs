@@ -71,7 +71,7 @@ fn meet(p: [DVec3; 3], origin: DVec3, direction: DVec3) -> Option<(DVec3, f64)> 
 }
 
 fn soup(seed: u64, objects: usize, reach: f32) -> Vec<(Mesh, usize)> {
-    let mut rng = Rng(seed);
+    let mut rng = Rng::new(seed);
     let mut one = |_| {
         let positions: Vec<Vec3> = (0..60).map(|_| rng.point(reach)).collect();
         (mesh(positions, (0..20).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect()), 0)
@@ -145,10 +145,10 @@ fn polygons(rng: &mut Rng, cells: usize, cell: f32, half: f32) -> [Mesh; 2] {
         let center = Vec3::new((c % cells) as f32 + 0.5, (c / cells) as f32 + 0.5, 0.0) * cell
             - Vec3::new(half, half, 0.0);
         let (n, first) = (5 + (rng.next() % 5) as u32, p.len() as u32);
-        let (radius, turn) = (rng.range(0.1, 0.45) * cell, rng.range(0.0, 6.0));
-        p.push(center + Vec3::new(rng.range(-0.2, 0.2), rng.range(-0.2, 0.2), 0.0) * radius);
+        let (radius, turn) = (rng.span(0.1, 0.45) * cell, rng.span(0.0, 6.0));
+        p.push(center + Vec3::new(rng.span(-0.2, 0.2), rng.span(-0.2, 0.2), 0.0) * radius);
         for k in 0..n {
-            let angle = turn + (k as f32 + rng.range(-0.3, 0.3)) * std::f32::consts::TAU / n as f32;
+            let angle = turn + (k as f32 + rng.span(-0.3, 0.3)) * std::f32::consts::TAU / n as f32;
             p.push(center + Vec3::new(angle.cos(), angle.sin(), 0.0) * radius);
             star.push([first, first + 1 + k, first + 1 + (k + 1) % n]);
             if k > 1 {
@@ -161,7 +161,7 @@ fn polygons(rng: &mut Rng, cells: usize, cell: f32, half: f32) -> [Mesh; 2] {
 
 #[test]
 fn shared_edges_are_covered_exactly_once() {
-    let mut rng = Rng(7);
+    let mut rng = Rng::new(7);
     let mut cells = 0;
     for (per_side, cell) in [(200, 5.0), (150, 7.0), (200, 4.0), (70, 15.0), (80, 12.0)] {
         let size = (per_side as f32 * cell) as usize;
@@ -185,7 +185,7 @@ fn shared_edges_are_covered_exactly_once() {
 #[test]
 fn four_samples_cover_as_much_as_there_is() {
     // Transparent at 4 samples: each triangle's share of a pixel adds up to the area.
-    let mut rng = Rng(9);
+    let mut rng = Rng::new(9);
     let [star, _] = polygons(&mut rng, 20, 10.0, 100.0);
     let area: f64 = star
         .triangles

@@ -150,10 +150,10 @@ fn what_blends_goes_over_what_lies_behind_in_linear_light() {
 
 #[test]
 fn transparent_neighbours_leave_no_seam() {
-    let mut rng = Rng(4);
+    let mut rng = Rng::new(4);
     for _ in 0..20 {
         let mut data = quad(1.0, 0.0);
-        data.positions.push(Vec3::new(rng.range(-0.9, 0.9), rng.range(-0.9, 0.9), 0.0));
+        data.positions.push(Vec3::new(rng.span(-0.9, 0.9), rng.span(-0.9, 0.9), 0.0));
         data.uvs[0].clear();
         data.triangles = vec![[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]];
         let stage = Stage::of(from_front(5.0, 2.0), Mesh::new(data).unwrap(), blending(Vec3::ONE, 0.5));

@@ -5,33 +5,13 @@ mod light;
 mod robust;
 mod surface;
 
+pub use crate::rng::Rng;
 use glam::{Vec2, Vec3, Vec4};
 use sinew::image::{Image, Rgba8};
 use sinew::mesh::{Mesh, MeshData};
 use sinew::render::Settings;
 use sinew::render::raster::{IdImage, Rasterizer, Stats};
 use sinew::scene::{AlphaMode, Camera, Light, Material, Object, Projection, Scene, Texture};
-
-/// A seeded generator (SplitMix64, Steele et al. 2014).
-pub struct Rng(pub u64);
-
-impl Rng {
-    pub fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    pub fn range(&mut self, lo: f32, hi: f32) -> f32 {
-        lo + (hi - lo) * (self.next() >> 40) as f32 / (1u64 << 24) as f32
-    }
-
-    pub fn point(&mut self, reach: f32) -> Vec3 {
-        Vec3::new(self.range(-reach, reach), self.range(-reach, reach), self.range(-reach, reach))
-    }
-}
 
 /// A scene that owns what it shows.
 pub struct Stage {

@@ -6,7 +6,7 @@ use sinew::scene::{Filter, LightKind, TextureId, TextureRef, WrapMode};
 
 /// Everything at once: opaque, masked and transparent triangles of all sizes, textured, lit, cut by the near plane.
 fn jumble(seed: u64) -> Stage {
-    let mut rng = Rng(seed);
+    let mut rng = Rng::new(seed);
     let mut stage = Stage::of(
         perspective(Vec3::new(0.0, 0.5, 1.5), Vec3::ZERO, 1.0),
         Mesh::default(),
@@ -35,7 +35,7 @@ fn jumble(seed: u64) -> Stage {
         for t in 0..60 {
             let center = rng.point(1.2);
             data.positions.extend((0..3).map(|_| center + rng.point(*size)));
-            data.uvs[0].extend((0..3).map(|_| Vec2::new(rng.range(-2.0, 2.0), rng.range(-2.0, 2.0))));
+            data.uvs[0].extend((0..3).map(|_| Vec2::new(rng.span(-2.0, 2.0), rng.span(-2.0, 2.0))));
             data.normals.extend((0..3).map(|_| rng.point(1.0).normalize()));
             data.triangles.push([3 * t, 3 * t + 1, 3 * t + 2]);
         }
@@ -83,7 +83,7 @@ fn threads_builds_and_old_buffers_do_not_show() {
 
 #[test]
 fn coordinates_of_any_kind_are_survived() {
-    let mut rng = Rng(5);
+    let mut rng = Rng::new(5);
     let strange = [
         f32::NAN,
         f32::INFINITY,
@@ -108,7 +108,7 @@ fn coordinates_of_any_kind_are_survived() {
                     if rng.next().is_multiple_of(3) {
                         strange[rng.next() as usize % strange.len()]
                     } else {
-                        rng.range(-2.0, 2.0)
+                        rng.span(-2.0, 2.0)
                     }
                 };
                 Vec3::new(pick(), pick(), pick())

@@ -14,7 +14,7 @@ fn textured(texture: Texture, uv_scale: f32, uv_shift: f32) -> Stage {
 }
 
 fn noise(side: u32, seed: u64) -> Vec<u8> {
-    let mut rng = Rng(seed);
+    let mut rng = Rng::new(seed);
     (0..side * side).flat_map(|_| [rng.next() as u8, rng.next() as u8, rng.next() as u8, 255]).collect()
 }
 
