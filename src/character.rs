@@ -3,11 +3,11 @@
 use crate::clip::{Clip, Target};
 use crate::fk::{self, Posed};
 use crate::mesh::Mesh;
-use crate::morph::Morphed;
+use crate::morph::{self, Morphed};
 use crate::pose::Pose;
 use crate::skeleton::{BoneId, Skeleton};
 use crate::skin::{self, Deformed, Method, Rest, Weights};
-use glam::{Affine3A, DVec3, Vec3};
+use glam::{Affine3A, DAffine3, DVec3, Vec3};
 
 /// A mesh's place in the character.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -270,6 +270,24 @@ impl Character {
         std::mem::swap(&mut deformed.positions, out);
         skin::deform(method, rest, palette, deformed);
         std::mem::swap(&mut deformed.positions, out);
+    }
+
+    /// World positions of an instance, all in f64: the slow reference for [`positions`](Self::positions). `bones` are
+    /// `world_from_bone` as [`fk::forward_f64`] gives them.
+    ///
+    /// # Panics
+    /// If `instance`, `pose` or `bones` are not of this character.
+    pub fn positions_f64(&self, instance: usize, pose: &Pose, bones: &[DAffine3]) -> Vec<DVec3> {
+        let inst = &self.instances[instance];
+        let mesh = self.mesh(inst);
+        let rest = morph::positions_f64(mesh, &pose.weights[inst.first_weight..][..mesh.targets.len()]);
+        match &inst.binding {
+            Binding::Bone(b) => skin::deform_f64(Method::Rigid(0), &rest, &[bones[b.index()]]),
+            Binding::Skin { palette, weights } => {
+                let wide = palette.iter().map(|(b, m)| bones[b.index()] * fk::widen(m));
+                skin::deform_f64(Method::Linear(weights), &rest, &wide.collect::<Vec<_>>())
+            }
+        }
     }
 
     fn morph<'s>(&'s self, instance: usize, pose: &Pose, morphed: &'s mut Morphed) -> Rest<'s> {

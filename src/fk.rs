@@ -125,7 +125,8 @@ pub fn forward_f64(skeleton: &Skeleton, pose: &Pose) -> Vec<DAffine3> {
     out
 }
 
-fn widen(m: &Affine3A) -> DAffine3 {
+/// The same matrix in f64.
+pub(crate) fn widen(m: &Affine3A) -> DAffine3 {
     let a = m.matrix3;
     DAffine3 {
         matrix3: DMat3::from_cols(a.x_axis.as_dvec3(), a.y_axis.as_dvec3(), a.z_axis.as_dvec3()),

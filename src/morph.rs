@@ -2,7 +2,7 @@
 
 use crate::mesh::Mesh;
 use crate::skin::Rest;
-use glam::{Vec3, Vec4};
+use glam::{DVec3, Vec3, Vec4};
 
 /// Morphed vertices; buffers are used again from frame to frame.
 #[derive(Clone, Debug, Default)]
@@ -31,4 +31,13 @@ impl Morphed {
         }
         Rest { positions: &self.positions, normals: &self.normals, tangents: &self.tangents }
     }
+}
+
+/// `v = v₀ + Σ_k w_k Δ_k` for positions alone, in f64.
+pub fn positions_f64(mesh: &Mesh, weights: &[f32]) -> Vec<DVec3> {
+    let mut out: Vec<DVec3> = mesh.positions.iter().map(|p| p.as_dvec3()).collect();
+    for (target, &w) in mesh.targets.iter().zip(weights).filter(|(_, w)| **w != 0.0) {
+        out.iter_mut().zip(&target.positions).for_each(|(p, d)| *p += d.as_dvec3() * w as f64);
+    }
+    out
 }

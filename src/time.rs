@@ -64,16 +64,15 @@ pub fn wrap(t: f64, range: Range, mode: Wrap) -> f64 {
     range.start + inside
 }
 
-/// Number of frames that show `range` at `fps`: one at each `start + k/fps` before the end, and at least one.
+/// Number of frames that show `range` at `fps`, to the nearest whole frame and at least one.
 ///
-/// A loop's last frame would repeat its first, so the end itself is left out.
+/// A loop's last frame would repeat its first, so the end itself is left out; a duration of 23.04 frames makes 23, since a 24th
+/// would almost repeat the first and the loop would stutter.
 ///
 /// # Errors
 /// [`TooManyFrames`] beyond `limit`: a last key at 10³⁰ s is a mistake, not an allocation.
 pub fn frame_count(range: Range, fps: f64, limit: usize) -> Result<usize, TooManyFrames> {
-    // A duration that is whole frames up to rounding has exactly so many.
-    let exact = range.duration().max(0.0) * fps;
-    let n = if (exact - exact.round()).abs() < 1e-6 { exact.round() } else { exact.ceil() };
+    let n = (range.duration().max(0.0) * fps).round();
     if n > limit as f64 || !n.is_finite() {
         return Err(TooManyFrames { frames: n, limit });
     }
@@ -112,6 +111,7 @@ mod tests {
         assert_eq!(frame_count(r(2.0), 24.0, 9999), Ok(48));
         assert_eq!(frame_count(r(0.0), 24.0, 9999), Ok(1));
         assert_eq!(frame_count(r(0.7083333), 24.0, 9999), Ok(17));
+        assert_eq!(frame_count(r(0.96), 24.0, 9999), Ok(23));
         assert!(frame_count(r(1e30), 24.0, 9999).is_err());
     }
 }

@@ -24,7 +24,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     // Where motion and look meet, so that character stays free of materials and importers can return both.
     ("asset", &["character", "scene", "skeleton"]),
     ("render", &["scene", "image", "mesh", "math"]),
-    ("frames", &["skeleton", "pose", "fk", "skin", "character", "image", "scene", "asset", "render"]),
+    ("frames", &["time", "skeleton", "pose", "fk", "skin", "character", "image", "scene", "asset", "render"]),
     // Formats: data rooms only, never frames or render.
     (
         "io",

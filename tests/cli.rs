@@ -181,23 +181,77 @@ fn a_skeleton_without_triangles_is_drawn_empty_with_a_warning() {
 }
 
 #[test]
-fn interrupting_leaves_no_half_file() {
+fn a_loop_goes_on_beyond_its_end() {
     let (dir, input) = folder();
-    let target = path(&dir, "long.apng");
-    let mut child = Command::new(env!("CARGO_BIN_EXE_sinew"))
-        .args(["render", &input, "-o", &target, "--size", "1024", "--frames", "1-5000", "-q"])
-        .spawn()
-        .expect("the program starts");
-    // Wait until it has begun to write.
-    for _ in 0..2000 {
-        if files(dir.path()).len() > 2 {
-            break;
+    let draw = |set: &str, wrap: &str| {
+        let target = path(&dir, "f.png");
+        let o = sinew(&[
+            "render", &input, "-o", &target, "--frames", set, "--fps", "8", "--wrap", wrap, "--size", "48",
+            "-f",
+        ]);
+        assert!(o.status.success(), "{}", text(&o.stderr));
+        std::fs::read(target).unwrap()
+    };
+    // A second at 8 a second: frame 11 is frame 3 again, or 7 on the way back, or the end.
+    assert!(draw("11", "loop") == draw("3", "clamp") && draw("11", "loop") != draw("11", "clamp"));
+    assert!(draw("12", "ping-pong") == draw("6", "clamp"));
+}
+
+#[test]
+fn the_input_is_never_overwritten() {
+    let (dir, input) = folder();
+    let disguised = path(&dir, "flag.gif");
+    std::fs::copy(&input, &disguised).unwrap();
+    let (code, message) = fails(&["render", &disguised, "-o", &disguised, "--force"]);
+    assert_eq!(code, 2);
+    assert!(message.contains("this is the input"), "{message}");
+    assert!(std::fs::read(&disguised).unwrap() == std::fs::read(&input).unwrap());
+}
+
+#[test]
+fn nobody_listening_on_standard_error_is_no_failure() {
+    let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").expect("/dev/full");
+    let run = |args: &[&str]| {
+        let mut c = Command::new(env!("CARGO_BIN_EXE_sinew"));
+        c.args(args).stderr(full()).stdout(std::process::Stdio::null()).status().expect("it starts").code()
+    };
+    let (dir, input) = folder();
+    assert_eq!(run(&["info", "nowhere.glb"]), Some(3));
+    assert_eq!(run(&["render", &input, "-v", "-o", &path(&dir, "a.gif"), "--size", "32"]), Some(0));
+}
+
+#[test]
+fn names_from_files_do_not_steer_the_terminal() {
+    let (dir, input) = folder();
+    let rig =
+        std::fs::read_to_string(&input).unwrap().replace("\"cloth\"", "\"\\u001b[31mred\\nclip 9: forged\"");
+    let evil = path(&dir, "evil.json");
+    std::fs::write(&evil, rig).unwrap();
+    let out = sinew(&["info", &evil]);
+    let said = text(&out.stdout);
+    assert!(out.status.success() && !said.contains('\x1b') && !said.contains("\nclip 9"), "{said}");
+}
+
+#[test]
+fn interrupting_leaves_no_half_file() {
+    for signal in ["-INT", "-TERM"] {
+        let (dir, input) = folder();
+        let target = path(&dir, "long.apng");
+        let mut child = Command::new(env!("CARGO_BIN_EXE_sinew"))
+            .args(["render", &input, "-o", &target, "--size", "1024", "--frames", "1-5000", "-q"])
+            .spawn()
+            .expect("the program starts");
+        // Wait until it has begun to write.
+        for _ in 0..2000 {
+            if files(dir.path()).len() > 2 {
+                break;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(2));
         }
-        std::thread::sleep(std::time::Duration::from_millis(2));
+        assert!(files(dir.path()).len() > 2, "it writes beside the target");
+        let kill = Command::new("kill").args([signal, &child.id().to_string()]).status().expect("kill runs");
+        assert!(kill.success());
+        assert_eq!(child.wait().expect("it ends").code(), Some(130));
+        assert_eq!(files(dir.path()).len(), 2, "{signal}: {:?}", files(dir.path()));
     }
-    assert!(files(dir.path()).len() > 2, "it writes beside the target");
-    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs");
-    assert!(kill.success());
-    assert_eq!(child.wait().expect("it ends").code(), Some(130));
-    assert_eq!(files(dir.path()).len(), 2, "{:?}", files(dir.path()));
 }

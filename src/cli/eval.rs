@@ -3,9 +3,10 @@
 use super::{Failure, find_clip, load_posed, print, say::Say};
 use serde::Serialize;
 use serde_json::json;
-use sinew::character::{Character, Scratch};
+use sinew::character::Instance;
+use sinew::fk;
 use sinew::io::{Import, Options};
-use sinew::skin::Deformed;
+use sinew::skeleton::BoneId;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -16,7 +17,8 @@ Examples:
   sinew eval rigs/pip.json --times 0
 
 Prints one object: {\"schema\":1, \"asset\", \"samples\":[{\"clip\", \"t\", \"nodes\", \"prims\"}]}. Matrices are column-major,
-world_from_node; positions are in world space and in the file's order. Rigs without glTF nodes have \"bones\" instead, each with
+world_from_node; positions are in world space and in the file's order. Everything is computed by the f64 reference, which the
+drawing path follows within 1e-5 of the asset's size. Rigs without glTF nodes have \"bones\" instead, each with
 its matrix, origin and tip. Times outside a clip hold its ends.";
 
 #[derive(clap::Args)]
@@ -51,10 +53,10 @@ pub struct Args {
 struct Sample {
     clip: Option<usize>,
     t: Option<f64>,
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    nodes: BTreeMap<u32, [f64; 16]>,
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    bones: BTreeMap<u32, Bone>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    nodes: Option<BTreeMap<u32, [f64; 16]>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bones: Option<BTreeMap<u32, Bone>>,
     prims: Vec<Primitive>,
 }
 
@@ -83,7 +85,10 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     let import = load_posed(&args.input, args.poses.as_ref(), Options { textures: false }, say)?;
     let clip = if args.rest { None } else { find_clip(&import, args.clip.as_deref())? };
     let times = if args.rest { vec![0.0] } else { args.times.clone() };
-    let samples: Vec<Sample> = times.iter().map(|&t| sample(&import, clip, t)).collect();
+    let mut samples: Vec<Sample> = times.iter().map(|&t| sample(&import, clip, t)).collect();
+    if args.rest {
+        samples.iter_mut().for_each(|s| s.t = None);
+    }
     let asset = args.input.file_name().unwrap_or_default().to_string_lossy();
     let mut text = json!({ "schema": 1, "asset": asset, "samples": samples }).to_string();
     text.push('\n');
@@ -92,39 +97,31 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
 
 fn sample(import: &Import, clip: Option<usize>, t: f64) -> Sample {
     let c = &import.asset.character;
+    let skeleton = c.skeleton();
     let pose = c.pose(clip, t);
-    let posed = c.posed(&pose);
-    let matrix = |b| glam::DMat4::from(posed.world_from_bone(b)).to_cols_array();
-    let nodes = import.nodes.iter().zip(c.skeleton().ids()).map(|(&n, b)| (n, matrix(b))).collect();
-    let bone = |b| {
-        let tip = posed.world_from_bone(b).transform_point3(c.skeleton().tip(b).as_dvec3());
-        let name = c.skeleton().name(b).to_string();
-        (b.0, Bone { name, matrix: matrix(b), origin: posed.origin(b).to_array(), tip: tip.to_array() })
+    let world = fk::forward_f64(skeleton, &pose);
+    let matrix = |b: BoneId| glam::DMat4::from(world[b.index()]).to_cols_array();
+    let bone = |b: BoneId| {
+        let place = &world[b.index()];
+        let tip = place.transform_point3(skeleton.tip(b).as_dvec3()).to_array();
+        let origin = place.translation.to_array();
+        (b.0, Bone { name: skeleton.name(b).to_string(), matrix: matrix(b), origin, tip })
     };
-    let plain = import.nodes.is_empty();
-    let bones = if plain { c.skeleton().ids().map(bone).collect() } else { BTreeMap::new() };
-    let prims = primitives(import, c, &pose, &posed);
-    Sample { clip, t: clip.map(|_| t), nodes, bones, prims }
-}
-
-fn primitives(
-    import: &Import,
-    c: &Character,
-    pose: &sinew::pose::Pose,
-    posed: &sinew::fk::Posed,
-) -> Vec<Primitive> {
-    let center = c.center(posed);
-    let (mut scratch, mut out) = (Scratch::default(), Deformed::default());
-    let one = |(i, inst): (usize, &sinew::character::Instance)| {
-        c.deform(i, pose, posed, center, &mut scratch, &mut out);
+    let plain = import.format != "glTF";
+    let nodes = import.nodes.iter().zip(skeleton.ids()).map(|(&n, b)| (n, matrix(b)));
+    let nodes = (!plain).then(|| nodes.collect());
+    let bones = plain.then(|| skeleton.ids().map(bone).collect());
+    let primitive = |(i, inst): (usize, &Instance)| {
         let source = import.primitives.get(i);
+        let positions = c.positions_f64(i, &pose, &world);
         Primitive {
             node: source.map(|s| s.node),
             mesh: source.map_or(inst.mesh.0, |s| s.mesh),
             primitive: source.map_or(0, |s| s.primitive),
-            count: out.positions.len(),
-            positions: out.positions.iter().flat_map(|p| (center + p.as_dvec3()).to_array()).collect(),
+            count: positions.len(),
+            positions: positions.iter().flat_map(|p| p.to_array()).collect(),
         }
     };
-    c.instances().iter().enumerate().map(one).collect()
+    let prims = c.instances().iter().enumerate().map(primitive).collect();
+    Sample { clip, t: Some(t), nodes, bones, prims }
 }

@@ -29,7 +29,7 @@ pub struct Job<'a> {
 }
 
 pub fn write(job: &Job, say: &Say) -> Result<(), Failure> {
-    // A temporary must not outlive Ctrl-C; the handler runs on a thread of its own.
+    // A temporary must not outlive Ctrl-C or a request to terminate; the handler runs on a thread of its own.
     let _ = ctrlc::set_handler(|| {
         picture::cleanup_temporaries();
         std::process::exit(130);

@@ -1,6 +1,6 @@
 //! `sinew info`: what is in a file.
 
-use super::{Failure, load, print, say::Say};
+use super::{Failure, load, print, say, say::Say};
 use serde_json::{Value, json};
 use sinew::character::Binding;
 use sinew::io::{Import, Options};
@@ -27,7 +27,8 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
-    let import = load(&args.input, Options { textures: false }, say)?;
+    // Textures are read too, so that what is wrong with them is told.
+    let import = load(&args.input, Options { textures: true }, say)?;
     let report = report(&import);
     let mut text = if args.json { report.to_string() } else { as_text(&report) };
     text.push('\n');
@@ -93,10 +94,11 @@ fn as_text(r: &Value) -> String {
     let list = |key: &str| r[key].as_array().cloned().unwrap_or_default();
     let name = |v: &Value| match v.as_str() {
         None | Some("") => "(unnamed)".to_string(),
-        Some(s) => s.to_string(),
+        Some(s) => say::name(s),
     };
     let mut t = String::new();
-    let generator = r["generator"].as_str().filter(|g| !g.is_empty()).map(|g| format!(", by {g}"));
+    let generator = r["generator"].as_str().filter(|g| !g.is_empty());
+    let generator = generator.map(|g| format!(", by {}", say::name(g)));
     let _ = writeln!(t, "{}{}", r["format"].as_str().unwrap_or_default(), generator.unwrap_or_default());
     let roots = list("bones").iter().filter(|b| b["parent"].is_null()).count();
     let _ = writeln!(
@@ -127,9 +129,10 @@ fn as_text(r: &Value) -> String {
     }
     let _ = writeln!(t, "instances  {}", list("instances").len());
     for (i, c) in list("clips").iter().enumerate() {
-        let seconds = c["duration"].as_f64().unwrap_or_default();
-        let (tracks, keys) = (&c["tracks"], &c["keys"]);
-        let _ = writeln!(t, "clip {i:<5} {}: {seconds:.3} s, {tracks} tracks, {keys} keys", name(&c["name"]));
+        let second = |key: &str| c[key].as_f64().unwrap_or_default();
+        let (start, end, tracks, keys) = (second("start"), second("end"), &c["tracks"], &c["keys"]);
+        let name = name(&c["name"]);
+        let _ = writeln!(t, "clip {i:<5} {name}: {start:.3}…{end:.3} s, {tracks} tracks, {keys} keys");
     }
     for (key, many) in [("materials", "materials "), ("cameras", "cameras   "), ("extensions", "extensions")]
     {

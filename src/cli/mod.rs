@@ -29,10 +29,10 @@ struct Cli {
     #[command(subcommand)]
     command: Command,
     /// Say nothing but errors.
-    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    #[arg(short, long, global = true, conflicts_with = "verbose", display_order = 900)]
     quiet: bool,
     /// Say more: every warning, what was chosen, what it cost.
-    #[arg(short, long, global = true)]
+    #[arg(short, long, global = true, display_order = 901)]
     verbose: bool,
 }
 
@@ -52,9 +52,12 @@ enum Command {
         /// Which shell.
         shell: clap_complete::Shell,
     },
-    /// Print the manual page (roff).
-    #[command(after_help = "Example:\n  sinew man | man -l -")]
-    Man,
+    /// Print a manual page (roff).
+    #[command(after_help = "Examples:\n  sinew man | man -l -\n  sinew man render | man -l -")]
+    Man {
+        /// Of which subcommand; of the program itself by default.
+        subcommand: Option<String>,
+    },
 }
 
 /// What went wrong, and so the exit code.
@@ -76,7 +79,7 @@ pub fn run() -> ExitCode {
         Command::Info(args) => info::run(&args, &say),
         Command::Eval(args) => eval::run(&args, &say),
         Command::Completions { shell } => completions(shell),
-        Command::Man => manual(),
+        Command::Man { subcommand } => manual(subcommand.as_deref()),
     };
     let (code, message) = match done {
         Ok(()) => return ExitCode::SUCCESS,
@@ -94,13 +97,19 @@ fn completions(shell: clap_complete::Shell) -> Result<(), Failure> {
     print(&script)
 }
 
-fn manual() -> Result<(), Failure> {
+fn manual(subcommand: Option<&str>) -> Result<(), Failure> {
+    let mut program = Cli::command();
+    // Building hands the global options down to the subcommands.
+    program.build();
+    let command = match subcommand {
+        None => program,
+        Some(name) => {
+            let of = program.find_subcommand(name).cloned();
+            of.ok_or_else(|| Failure::Usage(format!("man {name}: no such subcommand")))?
+        }
+    };
     let mut page = Vec::new();
-    let failed = |e: std::io::Error| Failure::Run(e.to_string());
-    clap_mangen::Man::new(Cli::command()).render(&mut page).map_err(failed)?;
-    for sub in Cli::command().get_subcommands() {
-        clap_mangen::Man::new(sub.clone()).render_options_section(&mut page).map_err(failed)?;
-    }
+    clap_mangen::Man::new(command).render(&mut page).map_err(|e| Failure::Run(e.to_string()))?;
     print(&page)
 }
 
@@ -136,14 +145,15 @@ fn load_posed(path: &Path, poses: Option<&PathBuf>, options: Options, say: &Say)
     Ok(import)
 }
 
-/// The clip that `--clip` names: a whole number is an index, anything else a name; the first by default, `None` without clips.
+/// The clip that `--clip` names: by name, else by index; the first by default, `None` without clips.
 fn find_clip(import: &Import, asked: Option<&str>) -> Result<Option<usize>, Failure> {
     let clips = import.asset.character.clips();
     let Some(asked) = asked else { return Ok((!clips.is_empty()).then_some(0)) };
     let named = clips.iter().position(|c| c.name == asked);
     let index = asked.parse::<usize>().ok().filter(|&i| i < clips.len());
     named.or(index).map(Some).ok_or_else(|| {
-        let names: Vec<String> = clips.iter().enumerate().map(|(i, c)| format!("{i} {}", c.name)).collect();
+        let names: Vec<String> =
+            clips.iter().enumerate().map(|(i, c)| format!("{i} {}", say::name(&c.name))).collect();
         let has = if names.is_empty() { "none".into() } else { names.join(", ") };
         Failure::Usage(format!("--clip {asked}: no such clip; the file has: {has}"))
     })

@@ -1,14 +1,14 @@
 //! `sinew render`: what is to be drawn, and from where.
 
 use super::film::{self, Job};
-use super::{Failure, find_clip, load_posed, print, say::Say};
+use super::{Failure, find_clip, load_posed, print, say, say::Say};
 use sinew::asset::Asset;
 use sinew::frames::{Shot, View};
 use sinew::image::color::linear_from_srgb;
 use sinew::io::Options;
 use sinew::io::picture::{Format, PngLevel, Target};
 use sinew::render::Settings;
-use sinew::time::{FrameSet, Range, Rate, frame_count, frame_time};
+use sinew::time::{FrameSet, Range, Rate, Wrap, frame_count, frame_time};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -20,7 +20,7 @@ Examples:
   sinew render fox.glb -o side.apng --camera yaw=90,pitch=5,fov=20
   sinew render fox.glb --list
 
-Frames are numbered from 1; frame 1 is the clip's first instant. The camera orbits the character and stands where all of it is
+Frames are numbered from 1; frame 1 shows 0 s, or the clip's first key if that is earlier. The camera orbits the character and stands where all of it is
 seen over the whole clip, unless --camera names one of the asset's. An existing file is kept unless --force is given.";
 
 /// Most frames of one film: eleven hours at 24 a second.
@@ -58,6 +58,9 @@ pub struct Args {
     /// Pixels, as in 512 or 1920x1080.
     #[arg(long, default_value = "512", value_name = "WxH", value_parser = parse_size)]
     size: [usize; 2],
+    /// What times outside the clip show: its ends (clamp), the clip again (loop), or there and back (ping-pong).
+    #[arg(long, default_value = "clamp", value_name = "MODE", value_parser = parse_wrap)]
+    wrap: Wrap,
     /// Colour behind the character: transparent or #rrggbb.
     #[arg(long, default_value = "#e8eaed", value_name = "COLOR", value_parser = parse_background)]
     background: [f32; 4],
@@ -101,6 +104,7 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     let options = Options { textures: target.is_some() };
     let import = load_posed(&args.input, args.poses.as_ref(), options, say)?;
     let Some(target) = target.filter(|_| !args.list) else { return list(&import.asset) };
+    keep_inputs(args, &target)?;
     let clip = if args.rest { None } else { find_clip(&import, args.clip.as_deref())? };
     let view = find_view(&import.asset, &args.camera)?;
     let moments = moments(args, &import.asset, clip, &target)?;
@@ -115,6 +119,7 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     let alone = moments.len() == 1;
     let settings = Settings { threads: if alone { threads } else { 1 }, ..settings };
     let shot = Shot::new(&import.asset, clip, view, args.background, settings).map_err(|e| usage(&e))?;
+    let shot = shot.wrapped(args.wrap);
     let transparent = args.background[3] < 1.0;
     let job = Job {
         shot: &shot,
@@ -128,6 +133,18 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
         force: args.force,
     };
     film::write(&job, say)
+}
+
+/// Refuse to write over what is being read, `--force` or not.
+fn keep_inputs(args: &Args, target: &Target) -> Result<(), Failure> {
+    let Ok(output) = target.path_of(1).canonicalize() else { return Ok(()) };
+    for input in [Some(&args.input), args.poses.as_ref()].into_iter().flatten() {
+        if input.canonicalize().is_ok_and(|i| i == output) {
+            let message = format!("-o {}: this is the input; choose another name", input.display());
+            return Err(Failure::Usage(message));
+        }
+    }
+    Ok(())
 }
 
 /// Frame numbers and seconds to be drawn.
@@ -183,10 +200,10 @@ fn find_view(asset: &Asset, text: &str) -> Result<View, Failure> {
 fn list(asset: &Asset) -> Result<(), Failure> {
     let mut text = String::new();
     for (i, c) in asset.character.clips().iter().enumerate() {
-        text += &format!("clip {i}: {} ({:.3} s)\n", c.name, c.playback().duration());
+        text += &format!("clip {i}: {} ({:.3} s)\n", say::name(&c.name), c.playback().duration());
     }
     for (i, c) in asset.cameras.iter().enumerate() {
-        text += &format!("camera {i}: {}\n", c.name);
+        text += &format!("camera {i}: {}\n", say::name(&c.name));
     }
     if text.is_empty() {
         text = "no clips and no cameras\n".into();
@@ -212,6 +229,15 @@ fn parse_background(text: &str) -> Result<[f32; 4], String> {
     let code = code.ok_or("expected transparent or #rrggbb")?;
     let channel = |shift: u32| linear_from_srgb((code >> shift & 255) as f32 / 255.0);
     Ok([channel(16), channel(8), channel(0), 1.0])
+}
+
+fn parse_wrap(text: &str) -> Result<Wrap, String> {
+    match text {
+        "clamp" => Ok(Wrap::Clamp),
+        "loop" => Ok(Wrap::Loop),
+        "ping-pong" => Ok(Wrap::PingPong),
+        _ => Err("expected clamp, loop or ping-pong".into()),
+    }
 }
 
 fn parse_level(text: &str) -> Result<PngLevel, String> {

@@ -21,26 +21,26 @@ impl Say {
     }
 
     pub fn error(&self, message: &str) {
-        eprintln!("{} {message}", self.paint("error:", "1;31"));
+        tell(&format!("{} {}", self.paint("error:", "1;31"), plain(message)));
     }
 
     pub fn warn(&self, message: &str) {
         if !self.quiet {
-            eprintln!("{} {message}", self.paint("warning:", "1;33"));
+            tell(&format!("{} {}", self.paint("warning:", "1;33"), plain(message)));
         }
     }
 
     /// Something worth knowing, shown unless `-q`.
     pub fn note(&self, message: &str) {
         if !self.quiet {
-            eprintln!("{message}");
+            tell(&plain(message));
         }
     }
 
     /// Something for the curious, shown with `-v`.
     pub fn detail(&self, message: &str) {
         if self.verbose {
-            eprintln!("{message}");
+            tell(&plain(message));
         }
     }
 
@@ -53,7 +53,7 @@ impl Say {
             self.warn(&format!("{}: {w}", file.display()));
         }
         if warnings.len() > shown {
-            eprintln!("… and {} more warnings; -v shows them", warnings.len() - shown);
+            tell(&format!("… and {} more warnings; -v shows them", warnings.len() - shown));
         }
     }
 
@@ -74,4 +74,20 @@ impl Say {
     fn paint(&self, text: &str, code: &str) -> String {
         if self.color { format!("\x1b[{code}m{text}\x1b[0m") } else { text.into() }
     }
+}
+
+/// A line on standard error; nobody may be listening, and that is no failure.
+fn tell(message: &str) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stderr(), "{message}");
+}
+
+/// Text from a file without what would steer a terminal; line breaks stay.
+fn plain(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() && c != '\n' { '\u{fffd}' } else { c }).collect()
+}
+
+/// A name from a file, fit for one line of a terminal.
+pub fn name(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
 }

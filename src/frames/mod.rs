@@ -15,6 +15,7 @@ use crate::render::Settings;
 use crate::render::raster::{IdImage, Rasterizer, Stats};
 use crate::scene::{Camera, Light, LightKind, Material, Object, Scene};
 use crate::skin::Deformed;
+use crate::time::{self, Range, Wrap};
 use glam::{Affine3A, DVec3, Vec3};
 
 /// What is filmed and from where; fixed for all its frames.
@@ -26,6 +27,8 @@ pub struct Shot<'a> {
     orbit: Camera,
     background: [f32; 4],
     settings: Settings,
+    wrap: Wrap,
+    range: Range,
     /// The asset's materials, and the one that meshes without a material wear.
     materials: Vec<Material>,
     /// The world point that the scene's frame has its origin at.
@@ -45,7 +48,8 @@ pub struct FrameStats {
 
 impl<'a> Shot<'a> {
     /// Set up a shot of `clip` (rest for `None`). With [`View::Orbit`] the camera stands so that no vertex leaves the picture
-    /// at up to [`Framing::MOMENTS`] moments spread over the whole clip, whichever frames are drawn later.
+    /// at any of the moments looked at: each 24th of a second of the whole clip, more thinly spread only where that would be
+    /// more than [`Framing::VERTICES`] vertices in all. Which frames are drawn later makes no difference.
     ///
     /// `background` is linear RGBA, alpha premultiplied.
     ///
@@ -79,12 +83,29 @@ impl<'a> Shot<'a> {
             }
             View::Mounted(_) => Framing::new(0.0, 0.0, 1.0, aspect),
         };
-        Ok(Self { asset, clip, view, orbit: framing.camera(), background, settings, materials, center })
+        let orbit = framing.camera();
+        Ok(Self {
+            asset,
+            clip,
+            view,
+            orbit,
+            background,
+            settings,
+            wrap: Wrap::Clamp,
+            range,
+            materials,
+            center,
+        })
     }
 
-    /// Draw the moment `t` (seconds) with the buffers of `worker`; times outside the clip hold its ends.
+    /// The same shot with another meaning of times outside the clip; they hold its ends otherwise.
+    pub fn wrapped(self, wrap: Wrap) -> Self {
+        Self { wrap, ..self }
+    }
+
+    /// Draw the moment `t` (seconds) with the buffers of `worker`.
     pub fn draw(&self, t: f64, worker: &mut Worker, out: &mut Rgba8) -> FrameStats {
-        worker.evaluate(self.asset, self.clip, t);
+        worker.evaluate(self.asset, self.clip, time::wrap(t, self.range, self.wrap));
         worker.deform(self.asset, self.center);
         let scene = self.scene(&worker.posed, &worker.deformed);
         let raster = worker.rasterizer.draw(&scene, &self.settings, out);
@@ -96,7 +117,7 @@ impl<'a> Shot<'a> {
     ///
     /// Objects are the character's mesh instances, in order.
     pub fn draw_ids(&self, t: f64, worker: &mut Worker, out: &mut IdImage) -> FrameStats {
-        worker.evaluate(self.asset, self.clip, t);
+        worker.evaluate(self.asset, self.clip, time::wrap(t, self.range, self.wrap));
         worker.deform(self.asset, self.center);
         let scene = self.scene(&worker.posed, &worker.deformed);
         let raster = worker.rasterizer.draw_ids(&scene, &self.settings, out);
@@ -165,8 +186,11 @@ impl<'a> Shot<'a> {
 /// Widen `framing` until it holds the whole clip.
 fn fit(asset: &Asset, clip: Option<usize>, center: DVec3, worker: &mut Worker, framing: &mut Framing) {
     let range = clip.map(|c| asset.character.clips()[c].playback()).unwrap_or_default();
-    // A moment each 24th of a second, both ends included; long clips are looked at more thinly.
-    let moments = (range.duration() * 24.0).clamp(0.0, (Framing::MOMENTS - 1) as f64).ceil() as usize + 1;
+    // A moment each 24th of a second, both ends included; long clips of large meshes are looked at more thinly.
+    let vertices: usize =
+        asset.character.instances().iter().map(|i| asset.character.mesh(i).positions.len()).sum();
+    let most = (Framing::VERTICES / vertices.max(1)).clamp(Framing::FEWEST, Framing::MOST);
+    let moments = (range.duration() * 24.0).clamp(0.0, (most - 1) as f64).ceil() as usize + 1;
     let mut positions = Vec::new();
     for k in 0..moments {
         let t = range.start + range.duration() * k as f64 / (moments - 1).max(1) as f64;

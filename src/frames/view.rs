@@ -45,8 +45,12 @@ pub struct Framing {
 }
 
 impl Framing {
-    /// Most moments of a clip at which vertices are looked at: each 24th of a second of the first four seconds' worth.
-    pub const MOMENTS: usize = 97;
+    /// Vertices looked at, over all moments of a clip: about a quarter of a second's work.
+    pub const VERTICES: usize = 20_000_000;
+    /// Moments that are looked at however large the mesh is.
+    pub(super) const FEWEST: usize = 97;
+    /// Moments that are looked at at most: forty minutes' worth.
+    pub(super) const MOST: usize = 57_601;
     /// Share of the picture, from its middle to its edge, that the character may fill.
     const FILL: f32 = 0.92;
 
@@ -87,7 +91,8 @@ impl Framing {
             return unit.camera();
         }
         // A lone point has no size; anything will do that is not zero.
-        let size = (self.high - self.low).length().max(self.high.abs().max_element() * 1e-3).max(1e-6);
+        let extent = (self.high - self.low).max_element();
+        let size = extent.max(self.high.abs().max_element() * 1e-6).max(1e-18);
         let middle = (self.low + self.high) * 0.5;
         let (eye, projection) = match self.projection {
             Projection::Perspective { .. } => {

@@ -31,7 +31,7 @@ fn half_srgb(from: &[u8], w: usize, h: usize) -> Vec<u8> {
         return half_opaque(from, w);
     }
     let (linear, codes) = (&*LINEAR_OF_SRGB8, &**CODES);
-    half(from, w, h, |c| linear[c as usize], |v| codes[(v * 65535.0 + 0.5) as usize & 0xffff])
+    half::<true>(from, w, h, |c| linear[c as usize], |v| codes[(v * 65535.0 + 0.5) as usize & 0xffff])
 }
 
 /// The plain mean of four opaque texels: most pictures have even sides and no holes, and this takes a third of the time.
@@ -52,7 +52,7 @@ fn half_opaque(from: &[u8], w: usize) -> Vec<u8> {
 }
 
 fn half_linear(from: &[u8], w: usize, h: usize) -> Vec<u8> {
-    half(from, w, h, |c| c as f32, |v| (v + 0.5) as u8)
+    half::<false>(from, w, h, |c| c as f32, |v| (v + 0.5) as u8)
 }
 
 /// Source texels of one target texel along a side: the first, and the weights of three, whose sum is 1.
@@ -68,9 +68,16 @@ fn taps(side: usize) -> Vec<(usize, [f32; 3])> {
     (0..n).map(one).collect()
 }
 
-/// The next level. Colours count by their alpha, so that what is invisible does not bleed into what is not.
+/// The next level. Colours count by their alpha, so that what is invisible does not bleed into what is not; in maps that hold no
+/// colours (`COLOR` is false) alpha means nothing and everything counts alike.
 #[inline(always)]
-fn half(from: &[u8], w: usize, h: usize, decode: impl Fn(u8) -> f32, encode: impl Fn(f32) -> u8) -> Vec<u8> {
+fn half<const COLOR: bool>(
+    from: &[u8],
+    w: usize,
+    h: usize,
+    decode: impl Fn(u8) -> f32,
+    encode: impl Fn(f32) -> u8,
+) -> Vec<u8> {
     let (columns, rows) = (taps(w), taps(h));
     let texels = from.as_chunks::<4>().0;
     let (wide, high) =
@@ -92,7 +99,7 @@ fn half(from: &[u8], w: usize, h: usize, decode: impl Fn(u8) -> f32, encode: imp
                 }
             }
             let scale = 1.0 / alpha;
-            let color = |c: usize| encode(if alpha > 0.0 { sum[c] * scale } else { plain[c] });
+            let color = |c: usize| encode(if COLOR && alpha > 0.0 { sum[c] * scale } else { plain[c] });
             out.extend_from_slice(&[color(0), color(1), color(2), (alpha + 0.5) as u8]);
         }
     }
@@ -117,7 +124,8 @@ mod tests {
             .flat_map(|i| [i * 7 % 256, i * 13 % 251, i * i % 256, 255].map(|v| v as u8))
             .collect();
         let (linear, codes) = (&*LINEAR_OF_SRGB8, &**CODES);
-        let long = half(&picture, 64, 32, |c| linear[c as usize], |v| codes[(v * 65535.0 + 0.5) as usize]);
+        let long =
+            half::<true>(&picture, 64, 32, |c| linear[c as usize], |v| codes[(v * 65535.0 + 0.5) as usize]);
         let off = half_srgb(&picture, 64, 32).iter().zip(&long).map(|(a, b)| a.abs_diff(*b)).max();
         assert!(off <= Some(1), "{off:?}");
     }

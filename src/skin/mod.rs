@@ -4,10 +4,12 @@
 
 mod bind;
 mod linear;
+mod reference;
 mod rigid;
 mod weights;
 
 pub use bind::{Segment, bind_closest};
+pub use reference::deform_f64;
 pub use weights::{Weights, WeightsError, WeightsReport};
 
 use glam::{Affine3A, Vec3, Vec4};

@@ -63,7 +63,8 @@ fn gather(frame: &Frame, walk: &Walk, scratch: &mut TileScratch) {
         let (from, bit) = (n * TILE * TILE + at, if frame.samples == 1 { resolve::WHOLE } else { 1 << n });
         for k in bits(inside.bitmask()) {
             let k = k as usize;
-            if z.0[k] > seen.z[from + k] {
+            // What lies exactly on an opaque surface, a decal, is before it.
+            if z.0[k] >= seen.z[from + k] {
                 mask[at + k] |= bit;
             }
         }

@@ -6,7 +6,7 @@
 //! 3. `tile`: each tile finds what is visible at each sample; `resolve` shades that and writes the colours.
 //!
 //! Samples are decided in integers and ties by the order of submission, so the picture does not depend on the number of
-//! threads, on the machine, or on the order in which tiles are drawn.
+//! threads, on the vector instructions that the machine has, or on the order in which tiles are drawn.
 
 mod blend;
 mod clip;
