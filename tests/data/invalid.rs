@@ -53,6 +53,33 @@ pub fn run(data: &Path) -> Result<(), String> {
     if bad.is_empty() { Ok(()) } else { Err(bad.join("\n")) }
 }
 
+/// The program on each of them: a picture, or exit code 3 and a message that names the file.
+pub fn program(data: &Path) -> Result<(), String> {
+    let out = tempfile::tempdir().map_err(|e| e.to_string())?;
+    let picture = out.path().join("a.png");
+    let mut bad = Vec::new();
+    let mut refused = 0;
+    for file in files(&data.join("invalid")) {
+        if file.extension().is_some_and(|e| e == "json") {
+            continue;
+        }
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_sinew"));
+        command.arg("render").arg(&file).arg("-o").arg(&picture).args(["--size", "32", "--at", "0.3", "-f"]);
+        let done = command.output().map_err(|e| e.to_string())?;
+        let said = String::from_utf8_lossy(&done.stderr).into_owned();
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        match done.status.code() {
+            Some(0) => {}
+            Some(3) if said.contains(name.as_ref()) => refused += 1,
+            code => bad.push(format!("{}: exit {code:?}, {}", file.display(), said.trim())),
+        }
+    }
+    if refused == 0 {
+        return Err("none was refused".into());
+    }
+    if bad.is_empty() { Ok(()) } else { Err(bad.join("\n")) }
+}
+
 /// The largest amount of memory that the process ever held, where the system tells.
 fn peak(bad: &mut Vec<String>) {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();

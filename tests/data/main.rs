@@ -36,4 +36,5 @@ const TESTS: &[(&str, Test)] = &[
     ("notes::cut_rigs_are_refused", notes::cut_rigs_are_refused),
     ("changed_bytes_never_panic", gltf_mutations::run),
     ("broken_files_are_refused_politely", invalid::run),
+    ("the_program_survives_broken_files", invalid::program),
 ];
