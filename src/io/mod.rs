@@ -13,6 +13,10 @@ pub mod rig_json;
 
 use crate::asset::Asset;
 
+/// Vertices times bones beyond which binding each part to its closest bone would take minutes.
+#[cfg(feature = "io")]
+const MAX_CLOSEST: usize = 1 << 26;
+
 /// Something that an import dropped, repaired or did not understand.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Warning {

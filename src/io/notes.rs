@@ -5,7 +5,7 @@
 //! bones without an entry stay at rest. The table is text: `columns rows`, then numbers column by column.
 
 use super::ply::{self, PlyError};
-use super::{Import, Options, Warning};
+use super::{Import, MAX_CLOSEST, Options, Warning};
 use crate::asset::Asset;
 use crate::character::{Binding, Character, CharacterError, Instance, MeshId};
 use crate::clip::{Clip, Curve, CurveError, Interpolation, Target, Track};
@@ -57,6 +57,17 @@ pub enum NotesError {
         path: PathBuf,
         /// What is wrong.
         why: String,
+    },
+    /// A rig without a table that is too large to bind by distance.
+    #[error(
+        "weights.file: there is no table, and {vertices} vertices with {bones} bones are more than the {MAX_CLOSEST} pairs \
+         that are bound by distance; supply the table"
+    )]
+    Closest {
+        /// Of the mesh.
+        vertices: usize,
+        /// That move vertices.
+        bones: usize,
     },
     /// A bone that cannot stand as it says.
     #[error("bones[{bone}]: {why}")]
@@ -276,7 +287,14 @@ fn bind(
             format!("weight_id {} but the table has {} columns", file.bones[b].weight_id, table.columns);
         return Err(NotesError::Bone { bone: b, why });
     }
+    // Each vertex gets a number a bone: bones that share columns must not make more of them than the table holds.
     let k = driving.len();
+    if k > table.columns {
+        return Err(wrong(format!(
+            "{} columns for {k} bones with a weight_id; each needs its own",
+            table.columns
+        )));
+    }
     let bones: Vec<u32> = (0..v).flat_map(|_| 0..k as u32).collect();
     let column = |b: usize| &table.values[file.bones[b].weight_id as usize * v..][..v];
     let weights: Vec<f32> = (0..v).flat_map(|i| driving.iter().map(move |&b| column(b)[i])).collect();
@@ -296,13 +314,17 @@ fn closest(
     rest_from_bone: &[DAffine3],
     driving: &[usize],
     mesh: &Mesh,
-) -> Result<Weights, WeightsError> {
+) -> Result<Weights, NotesError> {
+    let (vertices, bones) = (mesh.positions.len(), driving.len());
+    if vertices.saturating_mul(bones) > MAX_CLOSEST {
+        return Err(NotesError::Closest { vertices, bones });
+    }
     let segment = |&b: &usize| {
         let m = &rest_from_bone[b];
         [m.translation, m.transform_point3(DVec3::X * file.bones[b].length)].map(|p| p.as_vec3())
     };
     let segments: Vec<_> = driving.iter().map(segment).collect();
-    bind_closest(&mesh.positions, &mesh.triangles, &segments)
+    Ok(bind_closest(&mesh.positions, &mesh.triangles, &segments)?)
 }
 
 struct Table {
@@ -347,5 +369,42 @@ fn narrow(m: &DAffine3) -> Affine3A {
     Affine3A {
         matrix3: Mat3A::from_cols(c.x_axis.as_vec3a(), c.y_axis.as_vec3a(), c.z_axis.as_vec3a()),
         translation: m.translation.as_vec3a(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn too_many_pairs_for_binding_by_distance_are_an_error() {
+        let identity = [[1., 0., 0., 0.], [0., 1., 0., 0.], [0., 0., 1., 0.], [0., 0., 0., 1.]];
+        let bone = || Bone {
+            parent_id: -1,
+            weight_id: 0,
+            length: 1.0,
+            rest: identity,
+            xzx_min: None,
+            xzx_max: None,
+        };
+        let file = |n| File {
+            model: FileRef { file: "m.ply".into() },
+            weights: FileRef { file: "w".into() },
+            bones: (0..n).map(|_| bone()).collect(),
+            fk_animation: vec![],
+            ik_constraints: None,
+        };
+        let mesh =
+            Mesh::new(MeshData { positions: vec![Vec3::ZERO; 1 << 16], ..Default::default() }).unwrap();
+        let bind = |n: usize| {
+            let file = file(n);
+            closest(&file, &rest_transforms(&file.bones).unwrap(), &(0..n).collect::<Vec<_>>(), &mesh)
+        };
+        assert!(bind(2).is_ok());
+        let error = bind((1 << 10) + 1).unwrap_err().to_string();
+        assert!(
+            error.starts_with("weights.file: there is no table, and 65536 vertices with 1025 bones"),
+            "{error}"
+        );
     }
 }
