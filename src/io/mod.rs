@@ -128,6 +128,17 @@ pub fn read_file(path: &std::path::Path) -> std::io::Result<Vec<u8>> {
     Err(std::io::Error::other(format!("this is {what}; expected a file")))
 }
 
+/// All bytes of a plain file that lies below `root`, wherever links on the way may lead.
+#[cfg(feature = "io")]
+fn read_below(root: &std::path::Path, path: &std::path::Path) -> std::io::Result<Vec<u8>> {
+    let (real, root) = (path.canonicalize()?, root.canonicalize()?);
+    if real.starts_with(&root) {
+        return read_file(&real);
+    }
+    let message = format!("it is a link to {}, outside of {}", real.display(), root.display());
+    Err(std::io::Error::new(std::io::ErrorKind::PermissionDenied, message))
+}
+
 #[cfg(feature = "io")]
 enum Format {
     Gltf,

@@ -5,7 +5,7 @@
 //! bones without an entry stay at rest. The table is text: `columns rows`, then numbers column by column.
 
 use super::ply::{self, PlyError};
-use super::{Import, MAX_CLOSEST, Options, Warning};
+use super::{Import, MAX_CLOSEST, Options, Warning, read_below, read_file};
 use crate::asset::Asset;
 use crate::character::{Binding, Character, CharacterError, Instance, MeshId};
 use crate::clip::{Clip, Curve, CurveError, Interpolation, Target, Track};
@@ -141,10 +141,10 @@ struct Key {
 /// Read a rig of the notes and the files beside it.
 ///
 /// # Errors
-/// [`NotesError`] names the file and the entry. A missing table of weights is a [`Warning`]: parts then follow their closest
+/// [`NotesError`] names the file and the entry; so does a link that leads out of the rig's folder. A missing table of weights is a [`Warning`]: parts then follow their closest
 /// bone.
 pub fn import(path: &Path, options: &Options) -> Result<Import, NotesError> {
-    let bytes = std::fs::read(path).map_err(|source| NotesError::Read { path: path.into(), source })?;
+    let bytes = read_file(path).map_err(|source| NotesError::Read { path: path.into(), source })?;
     import_bytes(&bytes, path.parent().unwrap_or(Path::new("")), options)
 }
 
@@ -153,6 +153,7 @@ pub fn import(path: &Path, options: &Options) -> Result<Import, NotesError> {
 /// # Errors
 /// As [`import`].
 pub fn import_bytes(bytes: &[u8], folder: &Path, _options: &Options) -> Result<Import, NotesError> {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let file: File = serde_json::from_slice(bytes)?;
     let mut warnings = Vec::new();
     if file.ik_constraints.is_some() {
@@ -166,7 +167,8 @@ pub fn import_bytes(bytes: &[u8], folder: &Path, _options: &Options) -> Result<I
 
     // The mesh, with normals that the file does not have.
     let model = beside(folder, "model.file", &file.model.file)?;
-    let read = std::fs::read(&model).map_err(|source| NotesError::Read { path: model.clone(), source })?;
+    let read =
+        read_below(folder, &model).map_err(|source| NotesError::Read { path: model.clone(), source })?;
     let ply = ply::parse(&read).map_err(|source| NotesError::Ply { path: model, source })?;
     let mesh = mesh(&file.model.file, &ply)?;
 
@@ -266,8 +268,8 @@ fn bind(
         bones.iter().map(|&b| (of[b], narrow(&rest_from_bone[b].inverse()))).collect::<Vec<_>>()
     };
     let path = beside(folder, "weights.file", &file.weights.file)?;
-    let text = match std::fs::read_to_string(&path) {
-        Ok(text) => text,
+    let text = match read_below(folder, &path) {
+        Ok(bytes) => bytes,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
             let message = format!("`{}` is missing; each part follows its closest bone", file.weights.file);
             warnings.push(Warning { place: "weights.file".into(), message });
@@ -277,7 +279,8 @@ fn bind(
         Err(source) => return Err(NotesError::Read { path, source }),
     };
     let wrong = |why| NotesError::Table { path: path.clone(), why };
-    let table = parse_table(&text).map_err(wrong)?;
+    let text = std::str::from_utf8(&text).map_err(|e| wrong(format!("no text: {e}")))?;
+    let table = parse_table(text).map_err(wrong)?;
     let v = mesh.positions.len();
     if table.rows != v {
         return Err(wrong(format!("expected {v} rows, one a vertex, found {}", table.rows)));
@@ -375,6 +378,27 @@ fn narrow(m: &DAffine3) -> Affine3A {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn neither_links_out_of_the_folder_nor_pipes_are_read() {
+        let home = std::env::temp_dir().join(format!("sinew-notes-{}", std::process::id()));
+        std::fs::create_dir_all(home.join("rig")).unwrap();
+        std::fs::write(home.join("out.ply"), "ply").unwrap();
+        std::os::unix::fs::symlink("../out.ply", home.join("rig/link.ply")).unwrap();
+        std::process::Command::new("mkfifo").arg(home.join("rig/pipe.ply")).status().unwrap();
+        let error = |model: &str| {
+            let rig = format!(
+                r#"{{"model": {{"file": "{model}"}}, "weights": {{"file": "w"}}, "bones": [{{"parent_id": -1, "weight_id": 0,
+                "length": 1, "rest_T": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}}]}}"#
+            );
+            import_bytes(rig.as_bytes(), &home.join("rig"), &Options::default()).unwrap_err().to_string()
+        };
+        let (link, pipe) = (error("link.ply"), error("pipe.ply"));
+        std::fs::remove_dir_all(&home).unwrap();
+        assert!(link.contains("link.ply: it is a link to "), "{link}");
+        assert!(pipe.contains("pipe.ply: this is a pipe"), "{pipe}");
+    }
 
     #[test]
     fn too_many_pairs_for_binding_by_distance_are_an_error() {
