@@ -173,6 +173,33 @@ fn offsets_start_from_rest_and_channels_exclude_each_other() {
 }
 
 #[test]
+fn both_signs_of_a_quaternion_are_one_rotation() {
+    let skeleton = read(ARM).unwrap().asset.character.skeleton().clone();
+    // A tenth of a radian to and fro, once not at all; every other key is written with the other sign.
+    let q = glam::Quat::from_xyzw(0.5, 0.5, 0.5, 0.5);
+    let turned = -(q * glam::Quat::from_rotation_x(0.1));
+    let keys = [q, turned, q, -q, turned, -q];
+    for (kind, repeats) in
+        [("linear", false), ("catmull-rom", false), ("catmull-rom", true), ("hermite", false)]
+    {
+        let flat = if kind == "hermite" { ",0,0,0,0" } else { "" };
+        let row = |(t, q): (usize, &glam::Quat)| format!("[{t}{flat},{},{},{},{}{flat}]", q.x, q.y, q.z, q.w);
+        let rows = keys.iter().enumerate().map(row).collect::<Vec<_>>().join(",");
+        let text = format!(
+            r#"{{"sinew_poses": 1, "clips": [{{"name": "c", "loop": {repeats}, "interpolation": "{kind}",
+            "tracks": [{{"bone": "arm", "rotation": [{rows}]}}]}}]}}"#
+        );
+        let clip = &poses_from_bytes(text.as_bytes(), &skeleton).unwrap()[0];
+        for i in 0..=500 {
+            let found = clip.tracks[0].curve.sample_rotation(i as f64 * 0.01);
+            let off = crate::math::rotation::angle_between(found, q);
+            // Splines overshoot a little.
+            assert!(off < 0.12, "{kind}, loop {repeats}: {off} at {i} / 100 s");
+        }
+    }
+}
+
+#[test]
 fn paths_stay_inside_the_project() {
     for good in ["x.png", "../poses/x.json", "./a/../b.png", "a/../../poses/x.json"] {
         assert!(inside_project(good).is_ok(), "{good}");
