@@ -1,6 +1,6 @@
 //! What every deformer promises, and what skinning and kinematics keep at the extremes.
 
-use glam::{Affine3A, DAffine3, DQuat, DVec3, Mat3A, Quat, Vec3, Vec3A, Vec3Swizzles};
+use glam::{Affine3A, DAffine3, DQuat, DVec3, Quat, Vec3, Vec3Swizzles};
 use sinew::fk::{self, Posed};
 use sinew::math::rotation::angle_between;
 use sinew::pose::Pose;
@@ -170,20 +170,26 @@ fn ten_thousand_kilometres_away_a_rig_deforms_as_at_home() {
         let palette = [posed.near(BoneId(4), center), posed.near(BoneId(11), center)];
         run(Method::Linear(&w), &p, &n, &palette)
     };
-    let home = shape(&pose);
-    for far in [1.0, 1e3, 1e7] {
-        let turn = DQuat::from_rotation_y(0.9);
+    let place = |pose: &mut Pose, turn: DQuat, far: f64| {
         pose.placement = DAffine3::from_rotation_translation(turn, DVec3::new(far, -far, 0.5 * far));
-        let back = Mat3A::from_quat(turn.conjugate().as_quat());
-        for (a, b) in shape(&pose).positions.iter().zip(&home.positions) {
-            let off = Vec3::from(back * Vec3A::from(*a)).distance(*b);
-            assert!(off <= 5e-6, "{far} m away: {off}");
-        }
-        // Without a turn nothing at all may change beyond 1e-6 m.
-        pose.placement = DAffine3::from_translation(DVec3::new(far, -far, 0.5 * far));
-        for (a, b) in shape(&pose).positions.iter().zip(&home.positions) {
-            assert!(a.distance(*b) <= 1e-6, "{far} m away: {}", a.distance(*b));
-        }
+        shape(pose).positions.iter().map(|p| p.as_dvec3()).collect::<Vec<_>>()
+    };
+    let apart = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+    let turn = DQuat::from_rotation_y(0.9);
+    let (home, turned) = (place(&mut pose, DQuat::IDENTITY, 0.0), place(&mut pose, turn, 0.0));
+
+    // A turn alone rounds every vertex anew, at home as anywhere: 2ε of the distance to the centre.
+    let extent = home.iter().map(|p| p.length()).fold(0.0, f64::max);
+    let bound = 2.0 * f32::EPSILON as f64 * extent;
+    for far in [0.0, 1.0, 1e3, 1e7] {
+        let off = apart(&home, &place(&mut pose, DQuat::IDENTITY, far));
+        assert!(off <= 1e-6, "{far} m away: {off:e}");
+        let there = place(&mut pose, turn, far);
+        let off = apart(&turned, &there);
+        assert!(off <= 1e-6, "turned and {far} m away: {off:e}");
+        let back: Vec<DVec3> = there.iter().map(|p| turn.conjugate() * *p).collect();
+        let off = apart(&home, &back);
+        assert!(off <= bound, "turned back, {far} m away: {off:e}, bound {bound:e}");
     }
 }
 

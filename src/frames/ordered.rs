@@ -32,7 +32,7 @@ struct Queue<T> {
 /// [`Stop`], if `receive` asked for it.
 ///
 /// # Panics
-/// If a job panics.
+/// If a job or `receive` panics; all workers have ended by then.
 pub fn in_order<S, T: Send>(
     count: usize,
     threads: usize,
@@ -49,10 +49,12 @@ pub fn in_order<S, T: Send>(
     let queue = Mutex::new(Queue { next: 0, received: 0, waiting, stopped: false });
     let changed = Condvar::new();
     std::thread::scope(|scope| {
+        // A receiver that dies must not leave the workers waiting: the scope joins them.
+        let _stop = StopOnDrop { queue: &queue, changed: &changed };
         for _ in 0..threads.min(count) {
             scope.spawn(|| {
                 // A worker that dies must not leave the receiver waiting.
-                let guard = StopOnPanic { queue: &queue, changed: &changed };
+                let guard = StopOnDrop { queue: &queue, changed: &changed };
                 work(count, window, &queue, &changed, &state, &job);
                 std::mem::forget(guard);
             });
@@ -66,11 +68,7 @@ pub fn in_order<S, T: Send>(
             q.received = i + 1;
             drop(q);
             changed.notify_all();
-            if receive(i, result).is_err() {
-                lock(&queue).stopped = true;
-                changed.notify_all();
-                return Err(Stop);
-            }
+            receive(i, result)?;
         }
         Ok(())
     })
@@ -106,12 +104,13 @@ fn lock<T>(m: &Mutex<T>) -> MutexGuard<'_, T> {
     m.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-struct StopOnPanic<'a, T> {
+/// Ends all waiting, however its scope is left.
+struct StopOnDrop<'a, T> {
     queue: &'a Mutex<Queue<T>>,
     changed: &'a Condvar,
 }
 
-impl<T> Drop for StopOnPanic<'_, T> {
+impl<T> Drop for StopOnDrop<'_, T> {
     fn drop(&mut self) {
         lock(self.queue).stopped = true;
         self.changed.notify_all();
@@ -161,5 +160,18 @@ mod tests {
     #[should_panic]
     fn a_panic_in_a_job_reaches_the_caller() {
         let _ = in_order(10, 2, || (), |_, i| assert_ne!(i, 3), |_, _| Ok(()));
+    }
+
+    #[test]
+    fn a_panic_in_the_receiver_reaches_the_caller() {
+        // On a thread of its own, so that a deadlock fails instead of hanging.
+        let (done, wait) = std::sync::mpsc::channel();
+        std::thread::spawn(move || {
+            let run = || {
+                in_order(1000, 2, || (), |_, i| i, |i, _| if i == 3 { panic!("as asked") } else { Ok(()) })
+            };
+            let _ = done.send(std::panic::catch_unwind(run).is_err());
+        });
+        assert_eq!(wait.recv_timeout(std::time::Duration::from_secs(20)), Ok(true));
     }
 }

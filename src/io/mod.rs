@@ -13,6 +13,10 @@ pub mod rig_json;
 
 use crate::asset::Asset;
 
+/// Vertices times bones beyond which binding each part to its closest bone would take minutes.
+#[cfg(feature = "io")]
+const MAX_CLOSEST: usize = 1 << 26;
+
 /// Something that an import dropped, repaired or did not understand.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Warning {
@@ -122,6 +126,17 @@ pub fn read_file(path: &std::path::Path) -> std::io::Result<Vec<u8>> {
     }
     let what = if kind.is_dir() { "a folder" } else { "a pipe or a device" };
     Err(std::io::Error::other(format!("this is {what}; expected a file")))
+}
+
+/// All bytes of a plain file that lies below `root`, wherever links on the way may lead.
+#[cfg(feature = "io")]
+fn read_below(root: &std::path::Path, path: &std::path::Path) -> std::io::Result<Vec<u8>> {
+    let (real, root) = (path.canonicalize()?, root.canonicalize()?);
+    if real.starts_with(&root) {
+        return read_file(&real);
+    }
+    let message = format!("it is a link to {}, outside of {}", real.display(), root.display());
+    Err(std::io::Error::new(std::io::ErrorKind::PermissionDenied, message))
 }
 
 #[cfg(feature = "io")]

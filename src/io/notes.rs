@@ -5,7 +5,7 @@
 //! bones without an entry stay at rest. The table is text: `columns rows`, then numbers column by column.
 
 use super::ply::{self, PlyError};
-use super::{Import, Options, Warning};
+use super::{Import, MAX_CLOSEST, Options, Warning, read_below, read_file};
 use crate::asset::Asset;
 use crate::character::{Binding, Character, CharacterError, Instance, MeshId};
 use crate::clip::{Clip, Curve, CurveError, Interpolation, Target, Track};
@@ -57,6 +57,17 @@ pub enum NotesError {
         path: PathBuf,
         /// What is wrong.
         why: String,
+    },
+    /// A rig without a table that is too large to bind by distance.
+    #[error(
+        "weights.file: there is no table, and {vertices} vertices with {bones} bones are more than the {MAX_CLOSEST} pairs \
+         that are bound by distance; supply the table"
+    )]
+    Closest {
+        /// Of the mesh.
+        vertices: usize,
+        /// That move vertices.
+        bones: usize,
     },
     /// A bone that cannot stand as it says.
     #[error("bones[{bone}]: {why}")]
@@ -130,10 +141,10 @@ struct Key {
 /// Read a rig of the notes and the files beside it.
 ///
 /// # Errors
-/// [`NotesError`] names the file and the entry. A missing table of weights is a [`Warning`]: parts then follow their closest
+/// [`NotesError`] names the file and the entry; so does a link that leads out of the rig's folder. A missing table of weights is a [`Warning`]: parts then follow their closest
 /// bone.
 pub fn import(path: &Path, options: &Options) -> Result<Import, NotesError> {
-    let bytes = std::fs::read(path).map_err(|source| NotesError::Read { path: path.into(), source })?;
+    let bytes = read_file(path).map_err(|source| NotesError::Read { path: path.into(), source })?;
     import_bytes(&bytes, path.parent().unwrap_or(Path::new("")), options)
 }
 
@@ -142,6 +153,7 @@ pub fn import(path: &Path, options: &Options) -> Result<Import, NotesError> {
 /// # Errors
 /// As [`import`].
 pub fn import_bytes(bytes: &[u8], folder: &Path, _options: &Options) -> Result<Import, NotesError> {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let file: File = serde_json::from_slice(bytes)?;
     let mut warnings = Vec::new();
     if file.ik_constraints.is_some() {
@@ -155,7 +167,8 @@ pub fn import_bytes(bytes: &[u8], folder: &Path, _options: &Options) -> Result<I
 
     // The mesh, with normals that the file does not have.
     let model = beside(folder, "model.file", &file.model.file)?;
-    let read = std::fs::read(&model).map_err(|source| NotesError::Read { path: model.clone(), source })?;
+    let read =
+        read_below(folder, &model).map_err(|source| NotesError::Read { path: model.clone(), source })?;
     let ply = ply::parse(&read).map_err(|source| NotesError::Ply { path: model, source })?;
     let mesh = mesh(&file.model.file, &ply)?;
 
@@ -255,8 +268,8 @@ fn bind(
         bones.iter().map(|&b| (of[b], narrow(&rest_from_bone[b].inverse()))).collect::<Vec<_>>()
     };
     let path = beside(folder, "weights.file", &file.weights.file)?;
-    let text = match std::fs::read_to_string(&path) {
-        Ok(text) => text,
+    let text = match read_below(folder, &path) {
+        Ok(bytes) => bytes,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
             let message = format!("`{}` is missing; each part follows its closest bone", file.weights.file);
             warnings.push(Warning { place: "weights.file".into(), message });
@@ -266,7 +279,8 @@ fn bind(
         Err(source) => return Err(NotesError::Read { path, source }),
     };
     let wrong = |why| NotesError::Table { path: path.clone(), why };
-    let table = parse_table(&text).map_err(wrong)?;
+    let text = std::str::from_utf8(&text).map_err(|e| wrong(format!("no text: {e}")))?;
+    let table = parse_table(text).map_err(wrong)?;
     let v = mesh.positions.len();
     if table.rows != v {
         return Err(wrong(format!("expected {v} rows, one a vertex, found {}", table.rows)));
@@ -276,7 +290,14 @@ fn bind(
             format!("weight_id {} but the table has {} columns", file.bones[b].weight_id, table.columns);
         return Err(NotesError::Bone { bone: b, why });
     }
+    // Each vertex gets a number a bone: bones that share columns must not make more of them than the table holds.
     let k = driving.len();
+    if k > table.columns {
+        return Err(wrong(format!(
+            "{} columns for {k} bones with a weight_id; each needs its own",
+            table.columns
+        )));
+    }
     let bones: Vec<u32> = (0..v).flat_map(|_| 0..k as u32).collect();
     let column = |b: usize| &table.values[file.bones[b].weight_id as usize * v..][..v];
     let weights: Vec<f32> = (0..v).flat_map(|i| driving.iter().map(move |&b| column(b)[i])).collect();
@@ -296,13 +317,17 @@ fn closest(
     rest_from_bone: &[DAffine3],
     driving: &[usize],
     mesh: &Mesh,
-) -> Result<Weights, WeightsError> {
+) -> Result<Weights, NotesError> {
+    let (vertices, bones) = (mesh.positions.len(), driving.len());
+    if vertices.saturating_mul(bones) > MAX_CLOSEST {
+        return Err(NotesError::Closest { vertices, bones });
+    }
     let segment = |&b: &usize| {
         let m = &rest_from_bone[b];
         [m.translation, m.transform_point3(DVec3::X * file.bones[b].length)].map(|p| p.as_vec3())
     };
     let segments: Vec<_> = driving.iter().map(segment).collect();
-    bind_closest(&mesh.positions, &mesh.triangles, &segments)
+    Ok(bind_closest(&mesh.positions, &mesh.triangles, &segments)?)
 }
 
 struct Table {
@@ -347,5 +372,63 @@ fn narrow(m: &DAffine3) -> Affine3A {
     Affine3A {
         matrix3: Mat3A::from_cols(c.x_axis.as_vec3a(), c.y_axis.as_vec3a(), c.z_axis.as_vec3a()),
         translation: m.translation.as_vec3a(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn neither_links_out_of_the_folder_nor_pipes_are_read() {
+        let home = std::env::temp_dir().join(format!("sinew-notes-{}", std::process::id()));
+        std::fs::create_dir_all(home.join("rig")).unwrap();
+        std::fs::write(home.join("out.ply"), "ply").unwrap();
+        std::os::unix::fs::symlink("../out.ply", home.join("rig/link.ply")).unwrap();
+        std::process::Command::new("mkfifo").arg(home.join("rig/pipe.ply")).status().unwrap();
+        let error = |model: &str| {
+            let rig = format!(
+                r#"{{"model": {{"file": "{model}"}}, "weights": {{"file": "w"}}, "bones": [{{"parent_id": -1, "weight_id": 0,
+                "length": 1, "rest_T": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}}]}}"#
+            );
+            import_bytes(rig.as_bytes(), &home.join("rig"), &Options::default()).unwrap_err().to_string()
+        };
+        let (link, pipe) = (error("link.ply"), error("pipe.ply"));
+        std::fs::remove_dir_all(&home).unwrap();
+        assert!(link.contains("link.ply: it is a link to "), "{link}");
+        assert!(pipe.contains("pipe.ply: this is a pipe"), "{pipe}");
+    }
+
+    #[test]
+    fn too_many_pairs_for_binding_by_distance_are_an_error() {
+        let identity = [[1., 0., 0., 0.], [0., 1., 0., 0.], [0., 0., 1., 0.], [0., 0., 0., 1.]];
+        let bone = || Bone {
+            parent_id: -1,
+            weight_id: 0,
+            length: 1.0,
+            rest: identity,
+            xzx_min: None,
+            xzx_max: None,
+        };
+        let file = |n| File {
+            model: FileRef { file: "m.ply".into() },
+            weights: FileRef { file: "w".into() },
+            bones: (0..n).map(|_| bone()).collect(),
+            fk_animation: vec![],
+            ik_constraints: None,
+        };
+        let mesh =
+            Mesh::new(MeshData { positions: vec![Vec3::ZERO; 1 << 16], ..Default::default() }).unwrap();
+        let bind = |n: usize| {
+            let file = file(n);
+            closest(&file, &rest_transforms(&file.bones).unwrap(), &(0..n).collect::<Vec<_>>(), &mesh)
+        };
+        assert!(bind(2).is_ok());
+        let error = bind((1 << 10) + 1).unwrap_err().to_string();
+        assert!(
+            error.starts_with("weights.file: there is no table, and 65536 vertices with 1025 bones"),
+            "{error}"
+        );
     }
 }

@@ -7,10 +7,11 @@ use glam::Vec3;
 /// A bone as binding sees it: from base to tip, in the frame of the rest positions.
 pub type Segment = [Vec3; 2];
 
-/// Rigid weights: the closest segment for every triangle, then the majority by area within each connected component, so
-/// that no part tears (notes §7.8; distance is to the *segment*, not to its line or ends).
+/// Rigid weights: every vertex votes for its closest segment with the area of its triangles, and each connected component
+/// follows the majority, so that no part tears (notes §7.8; distance is to the *segment*, not to its line or ends).
 ///
-/// Vertices without a triangle go to their own closest segment. The result is one-hot.
+/// Vertices without a triangle go to their own closest segment. The result is one-hot. Time is vertices × segments, memory
+/// vertices + triangles + segments.
 ///
 /// # Errors
 /// [`WeightsError::Bone`] if there is no segment.
@@ -28,29 +29,50 @@ pub fn bind_closest(
     };
     let mut bones: Vec<u32> = positions.iter().map(|p| nearest(*p) as u32).collect();
 
-    // Every vertex votes for its bone with a third of the area of its triangles.
     let label = components(triangles);
-    let parts = label.iter().filter(|&&l| l != u32::MAX).max().map_or(0, |&m| m as usize + 1);
-    let mut votes = vec![0.0_f64; parts * segments.len()];
-    for t in triangles {
-        let p = t.map(|i| positions[i as usize]);
-        let area = (p[1] - p[0]).cross(p[2] - p[0]).length() as f64;
-        for &i in t {
-            votes[label[i as usize] as usize * segments.len() + bones[i as usize] as usize] += area;
-        }
-    }
-    let winner = |part: u32| {
-        let row = &votes[part as usize * segments.len()..][..segments.len()];
-        // On a tie the first bone wins, so that the result does not depend on float noise in the order of bones.
-        row.iter().enumerate().fold((0, f64::MIN), |best, (i, &v)| if v > best.1 { (i, v) } else { best }).0
-            as u32
-    };
+    let winner = majorities(positions, triangles, &label, &bones, segments.len());
     for (bone, &part) in bones.iter_mut().zip(&label) {
         if part != u32::MAX {
-            *bone = winner(part);
+            *bone = winner[part as usize];
         }
     }
     Ok(Weights::new(1, &bones, &vec![1.0; positions.len()], segments.len(), 0)?.0)
+}
+
+/// The bone that most of each part's area votes for; on a tie the first of them.
+fn majorities(
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    label: &[u32],
+    bones: &[u32],
+    bone_count: usize,
+) -> Vec<u32> {
+    // Take part by part, each in the order of its triangles, so that one row of votes serves all.
+    let part = |t: u32| label[triangles[t as usize][0] as usize];
+    let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
+    order.sort_by_key(|&t| part(t));
+    let mut votes = vec![0.0_f64; bone_count];
+    let mut named: Vec<u32> = Vec::new();
+    let one = |run: &[u32]| {
+        for t in run.iter().map(|&t| triangles[t as usize]) {
+            let p = t.map(|i| positions[i as usize]);
+            let area = (p[1] - p[0]).cross(p[2] - p[0]).length() as f64;
+            for bone in t.map(|i| bones[i as usize]) {
+                votes[bone as usize] += area;
+                named.push(bone);
+            }
+        }
+        // Clear only what was used: a thousand parts of one triangle cost no thousand rows.
+        named.sort_unstable();
+        named.dedup();
+        let mut best = (0, f64::NEG_INFINITY);
+        for bone in named.drain(..) {
+            let sum = std::mem::take(&mut votes[bone as usize]);
+            best = if sum > best.1 { (bone, sum) } else { best };
+        }
+        best.0
+    };
+    order.chunk_by(|&a, &b| part(a) == part(b)).map(one).collect()
 }
 
 fn distance_squared(p: Vec3, [a, b]: Segment) -> f32 {
@@ -73,6 +95,23 @@ mod tests {
         let w = bind_closest(&p, &[[0, 1, 2], [3, 4, 5]], &segments).unwrap();
         let bones: Vec<usize> = (0..6).map(|i| w.of(i).next().unwrap().0).collect();
         assert_eq!(bones, [0, 0, 0, 1, 1, 1]);
+    }
+
+    #[test]
+    fn parts_are_told_apart_whatever_the_order_of_triangles() {
+        // Squares of two triangles, every other one ten metres off.
+        let corners = |i: usize| {
+            let at = Vec3::X * (i % 2) as f32 * 10.0;
+            [at, at + Vec3::X * 0.1, at + Vec3::ONE * 0.1, at + Vec3::Y * 0.1]
+        };
+        let p: Vec<Vec3> = (0..1000).flat_map(corners).collect();
+        let half = |a: u32, b: u32| (0..1000).map(move |i| [4 * i, 4 * i + a, 4 * i + b]);
+        let triangles: Vec<[u32; 3]> = half(1, 2).chain(half(2, 3)).collect();
+        let segments = [[Vec3::X * 10.0; 2], [Vec3::ZERO; 2]];
+        let w = bind_closest(&p, &triangles, &segments).unwrap();
+        for v in 0..p.len() {
+            assert_eq!(w.of(v).next().unwrap().0, 1 - v / 4 % 2, "vertex {v}");
+        }
     }
 
     #[test]

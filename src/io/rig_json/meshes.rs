@@ -5,6 +5,7 @@ use super::document::{self, Bind};
 use super::error::RigError;
 use crate::character::{Binding, Instance, MeshId};
 use crate::fk::Posed;
+use crate::io::MAX_CLOSEST;
 use crate::io::Warning;
 use crate::mesh::normals::{self, Weighting};
 use crate::mesh::{MaterialId, Mesh, MeshData};
@@ -22,9 +23,6 @@ pub struct Rest<'a> {
 
 /// Influences a vertex beyond which a file is a mistake.
 const MAX_INFLUENCES: usize = 32;
-
-/// Vertices times bones beyond which `closest` would take minutes.
-const MAX_CLOSEST: usize = 1 << 26;
 
 /// One mesh, checked and bound; `first_weight` is 0, as the format has no morph targets.
 pub fn mesh(

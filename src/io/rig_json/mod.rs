@@ -18,32 +18,36 @@ pub use document::{Bind, Bone, Material, Mesh, Rig, Weights};
 pub use error::RigError;
 pub use export::{Exported, export, export_poses};
 pub use poses::{Clip, Interpolation, Poses, Tangents, Track};
+pub use texture::MAX_TEXTURE_BYTES;
 
 use crate::asset::Asset;
 use crate::character::{Character, MeshId};
 use crate::clip;
 use crate::fk;
-use crate::io::{Import, Options};
+use crate::io::{Import, Options, read_below, read_file};
 use crate::pose::Pose;
 use crate::skeleton::Skeleton;
-use std::path::{Component, Path};
+use std::path::Path;
 
-/// Fetches a file that a rig names, by its path relative to the rig.
+/// Fetches a file that a rig names, by its path relative to the rig, without `.` and needless `..`.
 pub type Fetch<'a> = &'a dyn Fn(&str) -> std::io::Result<Vec<u8>>;
 
 /// Read a rig, its textures and its poses.
 ///
 /// Poses come from the files in the rig's `poses` list, else from `../poses/` and the rig's own file name, if there is
-/// such a file. No path may leave the folder above the rig's.
+/// such a file. No path may leave the folder above the rig's, neither by `..` nor through a link. Pictures take at most
+/// [`MAX_TEXTURE_BYTES`] together.
 ///
 /// # Errors
 /// [`RigError::In`] names the file that is at fault.
 pub fn import(path: &Path, options: &Options) -> Result<Import, RigError> {
     let inside = |error: RigError| RigError::In { file: path.into(), error: Box::new(error) };
     let read = |source| RigError::Read { file: path.display().to_string(), source };
-    let bytes = std::fs::read(path).map_err(read)?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let fetch = |relative: &str| std::fs::read(folder.join(relative));
+    let bytes = read_file(path).map_err(read)?;
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let home = folder.canonicalize().map_err(read)?;
+    let above = home.parent().unwrap_or(&home);
+    let fetch = |relative: &str| read_below(above, &home.join(relative));
     let mut rig = Rig::from_bytes(&bytes).map_err(inside)?;
     if rig.poses.is_none()
         && let Some(name) = path.file_name().and_then(|n| n.to_str())
@@ -152,7 +156,7 @@ impl Rig {
         for file in self.poses.iter().flatten() {
             let path = inside_project(file)?;
             let read = |source| RigError::Read { file: file.clone(), source };
-            let bytes = fetch(path).map_err(read)?;
+            let bytes = fetch(&path).map_err(read)?;
             let inside = |error| RigError::In { file: file.into(), error: Box::new(error) };
             clips.extend(poses_from_bytes(&bytes, skeleton).map_err(inside)?);
         }
@@ -181,25 +185,29 @@ fn unique_materials(all: &[Material]) -> Result<(), RigError> {
     }
 }
 
-/// A relative path that stays inside the folder above the rig's own.
-fn inside_project(path: &str) -> Result<&str, RigError> {
+/// A relative path that stays inside the folder above the rig's own, without `.` and needless `..`: so one file has one
+/// spelling.
+fn inside_project(path: &str) -> Result<String, RigError> {
     let bad = |why| Err(RigError::Path { path: path.into(), why });
     if path.is_empty() || path.contains('\\') || path.contains(':') || path.contains('\0') {
         return bad("must be a relative path with forward slashes");
     }
-    let mut depth = 1;
-    for part in Path::new(path).components() {
+    if path.starts_with('/') {
+        return bad("must be relative to the rig");
+    }
+    let (mut up, mut names) = (0, Vec::new());
+    for part in path.split('/') {
         match part {
-            Component::Normal(_) => depth += 1,
-            Component::CurDir => (),
-            Component::ParentDir => depth -= 1,
-            Component::RootDir | Component::Prefix(_) => return bad("must be relative to the rig"),
+            "" | "." => (),
+            ".." if names.pop().is_none() => up += 1,
+            ".." => (),
+            name => names.push(name),
         }
-        if depth < 0 {
+        if up > 1 {
             return bad("leaves the folder above the rig's");
         }
     }
-    Ok(path)
+    Ok(format!("{}{}", ["", "../"][up], names.join("/")))
 }
 
 #[cfg(test)]

@@ -54,7 +54,8 @@ pub struct Track {
     /// Rows of `t, θ₁, θ₂, θ₃`: twist, bend, twist in degrees, from rest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub xzx_deg: Option<Vec<Vec<f64>>>,
-    /// Rows of `t, x, y, z, w`: the whole rotation against the parent as a quaternion.
+    /// Rows of `t, x, y, z, w`: the whole rotation against the parent as a quaternion; of `q` and `−q` the one nearer to the key
+    /// before is meant.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation: Option<Vec<Vec<f64>>>,
     /// Rows of `t, x, y, z`: the bone's origin in the parent's frame, metres.
@@ -170,7 +171,10 @@ fn one_track(c: &Clip, t: &Track, skeleton: &Skeleton, place: &str) -> Result<cl
     };
     let interpolation = t.interpolation.unwrap_or(c.interpolation);
     let keys = Keys::read(channel, rows, interpolation == Interpolation::Hermite, place)?;
-    let keys = keys.in_engine_units(channel, skeleton.rest(bone).translation);
+    let mut keys = keys.in_engine_units(channel, skeleton.rest(bone).translation);
+    if channel == "rotation" && interpolation != Interpolation::Hold {
+        keys.align_signs();
+    }
     let rule = match t.tangents.unwrap_or(c.tangents) {
         Tangents::Notes => spline::Tangents::Notes,
         Tangents::ThreePoint => spline::Tangents::ThreePoint,
@@ -239,6 +243,20 @@ impl Keys {
             _ => (),
         }
         self
+    }
+
+    /// Give each quaternion the sign that is nearer to the one before: `q` and `−q` are one rotation, but what is mixed from
+    /// them component by component passes through zero.
+    fn align_signs(&mut self) {
+        let w = self.width;
+        let (each, skip) = if self.sloped { (3 * w, w) } else { (w, 0) };
+        for k in 1..self.times.len() {
+            let (before, row) = self.values.split_at_mut(k * each);
+            let (last, row) = (&before[(k - 1) * each + skip..][..w], &mut row[..each]);
+            if last.iter().zip(&row[skip..]).map(|(a, b)| a * b).sum::<f64>() < 0.0 {
+                row.iter_mut().for_each(|v| *v = -*v);
+            }
+        }
     }
 
     fn into_curve(self, of: Interpolation, rule: spline::Tangents) -> Result<Curve, clip::CurveError> {

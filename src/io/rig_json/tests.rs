@@ -173,11 +173,43 @@ fn offsets_start_from_rest_and_channels_exclude_each_other() {
 }
 
 #[test]
+fn both_signs_of_a_quaternion_are_one_rotation() {
+    let skeleton = read(ARM).unwrap().asset.character.skeleton().clone();
+    // A tenth of a radian to and fro, once not at all; every other key is written with the other sign.
+    let q = glam::Quat::from_xyzw(0.5, 0.5, 0.5, 0.5);
+    let turned = -(q * glam::Quat::from_rotation_x(0.1));
+    let keys = [q, turned, q, -q, turned, -q];
+    for (kind, repeats) in
+        [("linear", false), ("catmull-rom", false), ("catmull-rom", true), ("hermite", false)]
+    {
+        let flat = if kind == "hermite" { ",0,0,0,0" } else { "" };
+        let row = |(t, q): (usize, &glam::Quat)| format!("[{t}{flat},{},{},{},{}{flat}]", q.x, q.y, q.z, q.w);
+        let rows = keys.iter().enumerate().map(row).collect::<Vec<_>>().join(",");
+        let text = format!(
+            r#"{{"sinew_poses": 1, "clips": [{{"name": "c", "loop": {repeats}, "interpolation": "{kind}",
+            "tracks": [{{"bone": "arm", "rotation": [{rows}]}}]}}]}}"#
+        );
+        let clip = &poses_from_bytes(text.as_bytes(), &skeleton).unwrap()[0];
+        for i in 0..=500 {
+            let found = clip.tracks[0].curve.sample_rotation(i as f64 * 0.01);
+            let off = crate::math::rotation::angle_between(found, q);
+            // Splines overshoot a little.
+            assert!(off < 0.12, "{kind}, loop {repeats}: {off} at {i} / 100 s");
+        }
+    }
+}
+
+#[test]
 fn paths_stay_inside_the_project() {
     for good in ["x.png", "../poses/x.json", "./a/../b.png", "a/../../poses/x.json"] {
         assert!(inside_project(good).is_ok(), "{good}");
     }
-    for bad in ["", "/etc/passwd", "../../x", "a/../../../x", "c:\\x", "..\\x", "file://x"] {
+    for one in ["a/b.png", "./a/b.png", "a//b.png", "a/./c/../b.png"] {
+        assert_eq!(inside_project(one).unwrap(), "a/b.png");
+    }
+    assert_eq!(inside_project("a/../../poses/x.json").unwrap(), "../poses/x.json");
+    for bad in ["", "/etc/passwd", "../../x", "a/../../../x", "c:\\x", "..\\x", "file://x", "a/../../../b/x"]
+    {
         assert!(inside_project(bad).is_err(), "{bad}");
     }
 }
@@ -198,4 +230,83 @@ fn broken_files_are_errors() {
         }
         let _ = import_bytes(&bytes, &Options::default(), &nothing);
     }
+}
+
+#[cfg(feature = "pictures")]
+fn with_textures(files: &[&str], fetch: Fetch) -> Result<Import, RigError> {
+    let one = |(i, f): (usize, &&str)| format!(r#"{{"name": "{i}", "texture": "{f}"}}"#);
+    let materials: Vec<String> = files.iter().enumerate().map(one).collect();
+    let rig = format!(
+        r#"{{"sinew_rig": 1, "bones": [{{"name": "a", "head": [0,0,0], "tail": [1,0,0]}}], "meshes": [],
+        "materials": [{}]}}"#,
+        materials.join(",")
+    );
+    import_bytes(rig.as_bytes(), &Options { textures: true }, fetch)
+}
+
+#[cfg(feature = "pictures")]
+fn white_png(side: u32) -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image::GrayImage::new(side, side).write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    bytes.into_inner()
+}
+
+#[cfg(feature = "pictures")]
+#[test]
+fn a_picture_under_several_spellings_is_decoded_once() {
+    let (png, fetched) = (white_png(2), std::cell::Cell::new(0));
+    let fetch = |_: &str| {
+        fetched.set(fetched.get() + 1);
+        Ok(png.clone())
+    };
+    let asset = with_textures(&["a.png", "./a.png", "x/..//a.png", "b.png"], &fetch).unwrap().asset;
+    assert_eq!((asset.textures.len(), fetched.get()), (2, 2));
+    let of = |i: usize| asset.materials[i].diffuse_map.unwrap().texture.0;
+    assert_eq!([0, 1, 2, 3].map(of), [0, 0, 0, 1]);
+}
+
+#[cfg(feature = "pictures")]
+#[test]
+fn pictures_beyond_the_bound_are_refused_before_they_are_decoded() {
+    // 8193² × 4 bytes are just too many; only the header is there.
+    let mut png = white_png(1);
+    png[16..20].copy_from_slice(&8193_u32.to_be_bytes());
+    png[20..24].copy_from_slice(&8193_u32.to_be_bytes());
+    let crc = png[12..29].iter().fold(!0_u32, |crc, &b| {
+        (0..8).fold(crc ^ u32::from(b), |c, _| if c & 1 == 1 { c >> 1 ^ 0xedb8_8320 } else { c >> 1 })
+    });
+    png[29..33].copy_from_slice(&(!crc).to_be_bytes());
+    let error = with_textures(&["a.png"], &|_| Ok(png.clone())).unwrap_err().to_string();
+    assert!(error.starts_with("texture `a.png`: 8193 × 8193 pixels; the pictures of a rig"), "{error}");
+
+    // Small ones count together.
+    let mut left = 4 * 2 * 2 + 1;
+    let small = white_png(2);
+    assert!(texture::decode("a", &small, &mut left).is_ok());
+    assert!(texture::decode("b", &small, &mut left).is_err());
+}
+
+#[cfg(unix)]
+#[test]
+fn neither_links_out_of_the_project_nor_pipes_are_read() {
+    let home = std::env::temp_dir().join(format!("sinew-rig-{}", std::process::id()));
+    std::fs::create_dir_all(home.join("project/rigs")).unwrap();
+    let (rigs, poses) = (home.join("project/rigs"), r#"{"sinew_poses": 1, "clips": []}"#);
+    std::fs::write(home.join("out.json"), poses).unwrap();
+    std::fs::write(home.join("project/in.json"), poses).unwrap();
+    std::os::unix::fs::symlink("../../out.json", rigs.join("out.json")).unwrap();
+    std::os::unix::fs::symlink("../in.json", rigs.join("in.json")).unwrap();
+    std::process::Command::new("mkfifo").arg(rigs.join("pipe.json")).status().unwrap();
+    let import = |poses: &str| {
+        let rig = ARM.replace("\"materials\"", &format!("\"poses\": [\"{poses}\"], \"materials\""));
+        std::fs::write(rigs.join("rig.json"), rig).unwrap();
+        import(&rigs.join("rig.json"), &Options::default()).map_err(|e| e.to_string())
+    };
+    let found = ["in.json", "out.json", "pipe.json"].map(import);
+    std::fs::remove_dir_all(&home).unwrap();
+    let [inside, out, pipe] = found;
+    assert!(inside.is_ok(), "{inside:?}");
+    let (out, pipe) = (out.unwrap_err(), pipe.unwrap_err());
+    assert!(out.contains("cannot read `out.json`: it is a link to "), "{out}");
+    assert!(pipe.contains("cannot read `pipe.json`: this is a pipe"), "{pipe}");
 }

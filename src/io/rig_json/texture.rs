@@ -4,17 +4,22 @@ use super::{Fetch, RigError, inside_project};
 use crate::io::Warning;
 use crate::scene::{Texture, TextureId};
 
+/// Bytes that the pictures of one rig may take together, decoded to four bytes a pixel and without their mip levels: 256 MiB.
+pub const MAX_TEXTURE_BYTES: u64 = 256 << 20;
+
 /// Pictures read so far; one that several materials name is read once.
 pub struct Textures<'a> {
     wanted: bool,
     fetch: Fetch<'a>,
     files: Vec<String>,
+    /// Bytes that may still be decoded.
+    left: u64,
     pub list: Vec<Texture>,
 }
 
 impl<'a> Textures<'a> {
     pub fn new(wanted: bool, fetch: Fetch<'a>) -> Self {
-        Self { wanted, fetch, files: Vec::new(), list: Vec::new() }
+        Self { wanted, fetch, files: Vec::new(), left: MAX_TEXTURE_BYTES, list: Vec::new() }
     }
 
     /// The texture of a file; `None` where pictures are left out.
@@ -23,31 +28,43 @@ impl<'a> Textures<'a> {
         if !self.wanted {
             return Ok(None);
         }
-        if let Some(i) = self.files.iter().position(|f| f == file) {
+        if let Some(i) = self.files.iter().position(|f| *f == path) {
             return Ok(Some(TextureId(i as u32)));
         }
-        let bytes = (self.fetch)(path).map_err(|source| RigError::Read { file: file.into(), source })?;
-        let Some(texture) = decode(file, &bytes)? else {
+        let bytes = (self.fetch)(&path).map_err(|source| RigError::Read { file: file.into(), source })?;
+        let Some(texture) = decode(file, &bytes, &mut self.left)? else {
             let message = format!("texture `{file}` is left out: this build has no picture decoders");
             warnings.push(Warning { place: "materials".into(), message });
             return Ok(None);
         };
-        self.files.push(file.into());
+        self.files.push(path);
         self.list.push(texture);
         Ok(Some(TextureId(self.list.len() as u32 - 1)))
     }
 }
 
 #[cfg(not(feature = "pictures"))]
-fn decode(_: &str, _: &[u8]) -> Result<Option<Texture>, RigError> {
+pub(super) fn decode(_: &str, _: &[u8], _: &mut u64) -> Result<Option<Texture>, RigError> {
     Ok(None)
 }
 
 #[cfg(feature = "pictures")]
-fn decode(file: &str, bytes: &[u8]) -> Result<Option<Texture>, RigError> {
+pub(super) fn decode(file: &str, bytes: &[u8], left: &mut u64) -> Result<Option<Texture>, RigError> {
     use crate::scene::{Filter, WrapMode};
     let error = |message: String| RigError::Texture { file: file.into(), message };
-    let mut reader = image::ImageReader::with_format(std::io::Cursor::new(bytes), image::ImageFormat::Png);
+    let open = || image::ImageReader::with_format(std::io::Cursor::new(bytes), image::ImageFormat::Png);
+
+    // Know the size before anything of that size is allocated.
+    let (width, height) = open().into_dimensions().map_err(|e| error(e.to_string()))?;
+    let size = 4 * u64::from(width) * u64::from(height);
+    *left = left.checked_sub(size).ok_or_else(|| {
+        error(format!(
+            "{width} × {height} pixels; the pictures of a rig may take {} MiB together, 4 bytes a pixel, and {} KiB are left",
+            MAX_TEXTURE_BYTES >> 20,
+            *left >> 10
+        ))
+    })?;
+    let mut reader = open();
     let mut limits = image::Limits::default();
     (limits.max_image_width, limits.max_image_height) = (Some(16_384), Some(16_384));
     reader.limits(limits);
