@@ -349,3 +349,96 @@ fn many_nodes_with_large_meshes_do_not_eat_memory() {
     file.json.as_object_mut().unwrap().remove("scene");
     assert!(matches!(file.result(), Err(GltfError::TooLarge { .. })));
 }
+
+#[test]
+fn a_file_behind_many_buffers_is_read_once_and_a_huge_one_never() {
+    let folder = std::env::temp_dir().join(format!("sinew-buffers-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let sparse = |name: &str, size: u64| {
+        std::fs::File::create(folder.join(name)).unwrap().set_len(size).unwrap();
+    };
+    sparse("a.bin", 8 << 20);
+    sparse("huge.bin", 3 << 30);
+    let read = |uri: &str| {
+        let mut json = File::new().json;
+        json["buffers"] = json!(vec![json!({ "byteLength": 60, "uri": uri }); 1000]);
+        import_bytes(json.to_string().as_bytes(), Some(&folder), "test.gltf", &Options::default())
+    };
+    let (many, huge) = (read("a.bin"), read("huge.bin"));
+    std::fs::remove_dir_all(&folder).unwrap();
+    many.unwrap();
+    let e = huge.unwrap_err().to_string();
+    assert!(e.starts_with("buffers[0].uri: asks for 3221225472 bytes"), "{e}");
+}
+
+/// Pictures of one grey, as data: 4×4, 8192×1, 1×8192, and the beginning of one of 16384×16384.
+#[cfg(feature = "pictures")]
+const PICTURES: [&str; 4] = [
+    "iVBORw0KGgoAAAANSUhEUgAAAAQAAAAECAAAAACMmsGiAAAADklEQVR42mNoAAIGVAIAUBQIAW1N4EkAAAAASUVORK5CYII=",
+    "iVBORw0KGgoAAAANSUhEUgAAIAAAAAABCAAAAABTIH+8AAAAH0lEQVR42u3BAQkAAAACoKY3vR2BmgIAAAAAAAAA9wYhWgDxR8gH0QAAAABJRU5ErkJggg==",
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAACAACAAAAAA+n3FsAAAAKElEQVR42u3CMQ0AAAACIKMb3Rg+DNIAAAAAAAAAAAAAAAAAAAAAZwNBwgDxrGlb9QAAAABJRU5ErkJggg==",
+    "iVBORw0KGgoAAAANSUhEUgAAQAAAAEAACAAAAACMo09YAAAAAElEQVQ1rwYeAAAAAElFTkSuQmCC",
+];
+
+/// As many primitives, materials, textures and images as there are places in `pictures`, material `i` with what `look` says.
+#[cfg(feature = "pictures")]
+fn pictured(pictures: &[usize], look: impl Fn(usize) -> Value) -> Import {
+    let mut file = File::new();
+    let primitive = file.primitive().clone();
+    let mut primitives = vec![primitive; pictures.len()];
+    primitives.iter_mut().enumerate().for_each(|(i, p)| p["material"] = json!(i));
+    file.json["meshes"][0]["primitives"] = json!(primitives);
+    let data = |&k: &usize| json!({ "uri": format!("data:image/png;base64,{}", PICTURES[k]) });
+    file.json["images"] = json!(pictures.iter().map(data).collect::<Vec<_>>());
+    let count = 0..pictures.len();
+    file.json["textures"] = json!(count.clone().map(|i| json!({ "source": i })).collect::<Vec<_>>());
+    file.json["materials"] = json!(count.map(look).collect::<Vec<_>>());
+    import_bytes(&file.bytes(), None, "test.glb", &Options { textures: true }).unwrap()
+}
+
+#[cfg(feature = "pictures")]
+#[test]
+fn materials_share_what_has_the_same_inputs() {
+    let import = pictured(&[0; 2000], |i| {
+        let pbr = json!({ "baseColorTexture": { "index": i }, "metallicRoughnessTexture": { "index": 0 } });
+        json!({ "pbrMetallicRoughness": pbr, "emissiveTexture": { "index": i } })
+    });
+    assert_eq!(import.asset.textures.len(), 3, "{:?}", import.warnings);
+    let maps = |m: &sinew::scene::Material| {
+        [m.diffuse_map, m.specular_map, m.emissive_map].map(|t| t.unwrap().texture)
+    };
+    let all: Vec<_> = import.asset.materials.iter().map(maps).collect();
+    assert!(all.len() == 2000 && all.iter().all(|m| *m == all[0]) && all[0][0] != all[0][1]);
+}
+
+#[cfg(feature = "pictures")]
+#[test]
+fn materials_that_nothing_drawn_uses_go_without_maps() {
+    let look = json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } });
+    let mut file = File::new();
+    file.json["images"] = json!([{ "uri": format!("data:image/png;base64,{}", PICTURES[0]) }]);
+    file.json["textures"] = json!([{ "source": 0 }]);
+    file.json["materials"] = json!([look, look]);
+    file.primitive()["material"] = json!(1);
+    let import = import_bytes(&file.bytes(), None, "test.glb", &Options { textures: true }).unwrap();
+    let maps: Vec<bool> = import.asset.materials.iter().map(|m| m.diffuse_map.is_some()).collect();
+    assert_eq!((maps, import.asset.textures.len()), (vec![false, true], 2));
+}
+
+#[cfg(feature = "pictures")]
+#[test]
+fn maps_without_room_are_left_out() {
+    // A wide picture and a tall one would meet in a grid of 8192×8192.
+    let import = pictured(&[1, 2], |_| {
+        json!({ "pbrMetallicRoughness": {
+            "baseColorTexture": { "index": 0 }, "metallicRoughnessTexture": { "index": 1 } } })
+    });
+    assert!(import.warnings[0].message.contains("more than 256 MiB"), "{:?}", import.warnings);
+    assert!(import.asset.materials[0].specular_map.is_none() && import.asset.textures.len() == 1);
+
+    // A picture beyond the limit is white.
+    let import = pictured(&[3], |_| json!({ "emissiveTexture": { "index": 0 } }));
+    assert_eq!(import.warnings[0].place, "images[0]");
+    assert!(import.warnings[0].message.contains("256 MiB"), "{:?}", import.warnings);
+    assert_eq!(import.asset.textures[0].levels(), [vec![255; 4]]);
+}

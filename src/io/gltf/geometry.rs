@@ -12,7 +12,7 @@ use crate::io::PrimitiveSource;
 use crate::mesh::{MaterialId, Mesh, MeshData};
 use ::gltf::json::mesh::{Mode, Primitive};
 use ::gltf::json::validation::Checked;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Where the morph weights of each node start, and how many it has.
 #[derive(Default)]
@@ -35,6 +35,8 @@ pub(super) struct Geometry {
     pub runs: Runs,
     /// A primitive has no material of its own, so the default one is needed.
     pub default_material: bool,
+    /// Materials that primitives with triangles use.
+    pub drawn: BTreeSet<usize>,
     done: BTreeMap<(usize, usize), Option<Built>>,
 }
 
@@ -181,7 +183,11 @@ impl Geometry {
             w.push(place, "is made of points or lines, which are not drawn; its vertices were kept");
         }
         data.triangles = triangles(mode, indices, data.positions.len(), place, w)?;
-        data.material = Some(self.material(doc, primitive, place)?);
+        let material = self.material(doc, primitive, place)?;
+        if !data.triangles.is_empty() {
+            self.drawn.insert(material.0 as usize);
+        }
+        data.material = Some(material);
         attributes::complete(doc, primitive, &mut data);
         Mesh::new(data).map_err(|source| GltfError::Mesh { place: place.into(), source })
     }

@@ -5,6 +5,7 @@
 
 mod accessor;
 mod attributes;
+mod bake;
 mod clips;
 mod compressed;
 mod container;
@@ -82,7 +83,7 @@ fn assemble(doc: &Document, base: Option<&Path>, options: &Options, mut w: Warni
     let nodes = nodes::build(doc, &clips::animated(doc), &mut w)?;
     let geometry = geometry::build(doc, &nodes, &mut w)?;
     let clips = clips::build(doc, &nodes, &geometry.runs, &mut w)?;
-    let looks = material::build(doc, base, options, geometry.default_material, &mut w)?;
+    let looks = material::build(doc, base, options, &geometry, &mut w)?;
     let character =
         Character::new(nodes.skeleton, geometry.meshes, geometry.instances, geometry.rest_weights, clips)?;
     let cameras = mounts::cameras(doc, &nodes.in_scene, &nodes.bone_of, &mut w)?;
