@@ -351,6 +351,18 @@ fn many_nodes_with_large_meshes_do_not_eat_memory() {
 }
 
 #[test]
+fn every_instance_counts_its_deformed_vertices() {
+    let mut file = File::new();
+    let p = file.floats("VEC3", &[0.5; 60_000]);
+    file.primitive()["attributes"]["POSITION"] = json!(p);
+    file.json["nodes"] = json!(vec![json!({ "mesh": 0 }); 2000]);
+    file.json["scenes"] = json!([]);
+    file.json.as_object_mut().unwrap().remove("scene");
+    let e = file.error();
+    assert!(e.contains("20000 vertices of meshes[0].primitives[0]") && e.contains("bytes allowed"), "{e}");
+}
+
+#[test]
 fn a_file_behind_many_buffers_is_read_once_and_a_huge_one_never() {
     let folder = std::env::temp_dir().join(format!("sinew-buffers-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();

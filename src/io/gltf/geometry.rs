@@ -14,6 +14,9 @@ use ::gltf::json::mesh::{Mode, Primitive};
 use ::gltf::json::validation::Checked;
 use std::collections::{BTreeMap, BTreeSet};
 
+/// Bytes that a frame keeps for each vertex of an instance: position, normal, tangent.
+const INSTANCE_BYTES: u64 = 40;
+
 /// Where the morph weights of each node start, and how many it has.
 #[derive(Default)]
 pub(super) struct Runs(BTreeMap<usize, (usize, usize)>);
@@ -97,7 +100,8 @@ impl Geometry {
                     Binding::Bone(bone(nodes, node, || place.clone())?)
                 }
             };
-            doc.charge(256, &place)?;
+            let bytes = 256 + count as u64 * INSTANCE_BYTES;
+            doc.charge(bytes, &format!("nodes[{node}] (an instance of {count} vertices of {place})"))?;
             self.instances.push(Instance { mesh: built.mesh, binding, first_weight: run });
             self.sources.push(PrimitiveSource { node: node as u32, mesh: mesh as u32, primitive: p as u32 });
         }
