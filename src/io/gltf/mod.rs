@@ -53,10 +53,7 @@ use warnings::Warnings;
 pub fn import(path: &Path, options: &Options) -> std::result::Result<Import, GltfError> {
     let file = || path.display().to_string();
     let read = |source| GltfError::Read { place: "file".into(), file: file(), source };
-    if path.is_dir() {
-        return Err(read(std::io::Error::from(std::io::ErrorKind::IsADirectory)));
-    }
-    let bytes = std::fs::read(path).map_err(read)?;
+    let bytes = super::read_file(path).map_err(read)?;
     let folder = path.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p });
     import_bytes(&bytes, folder, &file(), options)
 }
