@@ -251,10 +251,13 @@ fn keys_are_sorted_and_bad_ones_named() {
     let import = file.import();
     assert_eq!(positions(&import, Some(0), 0.5, 0)[0], Vec3::new(0.5, 0.0, 0.0));
     assert_eq!(import.warnings.len(), 2, "{:?}", import.warnings);
+    let channels = file.json["animations"][0]["channels"].as_array_mut().unwrap();
+    channels.swap(0, 1);
+    assert_eq!(file.import().warnings[1].place, "animations[0].channels[1]");
     let bad = file.floats("VEC3", &[0., 0., 0., 0., f32::NAN, 0., 5., 0., 0.]);
     file.json["animations"][0]["samplers"][0]["output"] = json!(bad);
     let e = file.error();
-    assert!(e.starts_with("animations[0].channels[0]: key 0: its value is not finite"), "{e}");
+    assert!(e.starts_with("animations[0].channels[1]: key 0: its value is not finite"), "{e}");
 }
 
 #[test]
@@ -453,4 +456,68 @@ fn maps_without_room_are_left_out() {
     assert_eq!(import.warnings[0].place, "images[0]");
     assert!(import.warnings[0].message.contains("256 MiB"), "{:?}", import.warnings);
     assert_eq!(import.asset.textures[0].levels(), [vec![255; 4]]);
+}
+
+#[test]
+fn a_normal_map_without_normals_leaves_a_surface_flat() {
+    let mut file = File::new();
+    let (uvs, n) = (file.floats("VEC2", &[0., 0., 1., 0., 1., 1., 0., 1., 0., 0.]), [0., 0., 1.].repeat(5));
+    let (normals, t) = (file.floats("VEC3", &n), file.floats("VEC4", &[1., 0., 0., 1.].repeat(5)));
+    file.primitive()["attributes"]["TEXCOORD_0"] = json!(uvs);
+    file.primitive()["attributes"]["TANGENT"] = json!(t);
+    file.primitive()["material"] = json!(0);
+    file.json["materials"] = json!([{ "normalTexture": { "index": 0 } }]);
+    let counts = |file: &File| {
+        let import = file.import();
+        let mesh = &import.asset.character.meshes()[0];
+        (mesh.normals.len(), mesh.tangents.len())
+    };
+    assert_eq!(counts(&file), (0, 0));
+    file.primitive()["attributes"].as_object_mut().unwrap().remove("TANGENT");
+    file.primitive()["attributes"]["NORMAL"] = json!(normals);
+    assert_eq!(counts(&file), (5, 5));
+    let turned = json!({ "KHR_texture_transform": { "rotation": 1.0 } });
+    file.json["materials"][0]["normalTexture"]["extensions"] = turned;
+    assert_eq!(counts(&file), (5, 0));
+}
+
+#[test]
+fn what_is_left_out_is_said() {
+    let mut file = skinned();
+    let uvs = file.floats("VEC2", &[0.0; 10]);
+    let (colors, joints) =
+        (file.floats("VEC4", &[1.0; 20]), file.primitive()["attributes"]["JOINTS_0"].clone());
+    file.primitive()["attributes"]["TEXCOORD_2"] = json!(uvs);
+    file.primitive()["attributes"]["COLOR_1"] = json!(colors);
+    file.primitive()["attributes"]["JOINTS_1"] = joints;
+    file.json["cameras"] = json!([
+        { "type": "perspective", "perspective": { "yfov": 0.7, "znear": 0.1, "aspectRatio": 1.5 } },
+        { "type": "orthographic", "orthographic": { "xmag": 2, "ymag": 1, "znear": 0.1, "zfar": 9 } }
+    ]);
+    file.json["nodes"][1]["camera"] = json!(0);
+    file.json["nodes"][2]["camera"] = json!(1);
+    let warnings: Vec<String> = file.import().warnings.iter().map(|w| w.to_string()).collect();
+    for word in [
+        "COLOR_0",
+        "TEXCOORD_1",
+        "joints but no weights",
+        "cameras[0]: its aspectRatio",
+        "cameras[1]: its xmag",
+    ] {
+        assert!(warnings.iter().any(|w| w.contains(word)), "{word}: {warnings:?}");
+    }
+}
+
+#[test]
+fn chains_of_small_scales_have_finite_bones() {
+    let mut file = File::new();
+    let leaf = |k: usize| json!({ "scale": [1e-8, 1e-8, 1e-8], "children": [k + 1] });
+    let mut nodes =
+        vec![json!({ "mesh": 0, "children": [1] }), json!({ "translation": [1, 0, 0], "children": [2] })];
+    nodes.extend((2..12).map(leaf));
+    nodes.push(json!({}));
+    file.json["nodes"] = json!(nodes);
+    let import = file.import();
+    let s = import.asset.character.skeleton();
+    assert!(s.ids().all(|b| s.tip(b).is_finite()));
 }

@@ -6,7 +6,7 @@ use super::pictures::{self, PIXEL_BYTES, Pictures, with_mips};
 use super::warnings::Warnings;
 use crate::io::Options;
 use crate::scene::{Filter, Texture, TextureId, TextureRef, WrapMode};
-use ::gltf::json::texture::{Info, MagFilter, Sampler, WrappingMode};
+use ::gltf::json::texture::{Info, MagFilter, MinFilter, Sampler, WrappingMode};
 use ::gltf::json::validation::Checked;
 use glam::{Affine2, Vec2, Vec3};
 use serde_json::{Map, Value};
@@ -96,7 +96,10 @@ impl<'a> Textures<'a> {
         let mut wanted = vec![false; doc.root.images.len()];
         for slot in slots.filter(|_| options.textures) {
             match source(doc, slot.texture).map(|s| wanted.get_mut(s)) {
-                Some(Some(flag)) => *flag = true,
+                Some(Some(flag)) => {
+                    *flag = true;
+                    minified(doc, slot.texture, w);
+                }
                 _ => {
                     w.push(format!("textures[{}]", slot.texture), "has no picture that can be read; left out")
                 }
@@ -249,6 +252,20 @@ fn lay(texture: TextureId, slot: Slot, w: &mut Warnings) -> Option<TextureRef> {
         return None;
     }
     Some(TextureRef { texture, uv_set: slot.uv_set as u8, transform: slot.transform })
+}
+
+/// Say where a picture is asked to be made smaller in another way than ours.
+fn minified(doc: &Document, texture: usize, w: &mut Warnings) {
+    let Some(index) = doc.root.textures[texture].sampler.map(|s| s.value()) else { return };
+    let Some(sampler) = doc.root.samplers.get(index) else { return };
+    let ours = match sampling(Some(sampler)).1 {
+        Filter::Nearest => MinFilter::NearestMipmapNearest,
+        Filter::Trilinear => MinFilter::LinearMipmapLinear,
+    };
+    if sampler.min_filter.is_some_and(|f| f != Checked::Valid(ours)) {
+        let message = "its minFilter is ignored; mip levels are mixed linearly, or taken nearest where magFilter is NEAREST";
+        w.push(format!("samplers[{index}]"), message);
+    }
 }
 
 fn code(wrap: [WrapMode; 2], filter: Filter) -> Sampling {
