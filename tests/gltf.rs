@@ -251,10 +251,13 @@ fn keys_are_sorted_and_bad_ones_named() {
     let import = file.import();
     assert_eq!(positions(&import, Some(0), 0.5, 0)[0], Vec3::new(0.5, 0.0, 0.0));
     assert_eq!(import.warnings.len(), 2, "{:?}", import.warnings);
+    let channels = file.json["animations"][0]["channels"].as_array_mut().unwrap();
+    channels.swap(0, 1);
+    assert_eq!(file.import().warnings[1].place, "animations[0].channels[1]");
     let bad = file.floats("VEC3", &[0., 0., 0., 0., f32::NAN, 0., 5., 0., 0.]);
     file.json["animations"][0]["samplers"][0]["output"] = json!(bad);
     let e = file.error();
-    assert!(e.starts_with("animations[0].channels[0]: key 0: its value is not finite"), "{e}");
+    assert!(e.starts_with("animations[0].channels[1]: key 0: its value is not finite"), "{e}");
 }
 
 #[test]
@@ -348,4 +351,173 @@ fn many_nodes_with_large_meshes_do_not_eat_memory() {
     file.json["scenes"] = json!([]);
     file.json.as_object_mut().unwrap().remove("scene");
     assert!(matches!(file.result(), Err(GltfError::TooLarge { .. })));
+}
+
+#[test]
+fn every_instance_counts_its_deformed_vertices() {
+    let mut file = File::new();
+    let p = file.floats("VEC3", &[0.5; 60_000]);
+    file.primitive()["attributes"]["POSITION"] = json!(p);
+    file.json["nodes"] = json!(vec![json!({ "mesh": 0 }); 2000]);
+    file.json["scenes"] = json!([]);
+    file.json.as_object_mut().unwrap().remove("scene");
+    let e = file.error();
+    assert!(e.contains("20000 vertices of meshes[0].primitives[0]") && e.contains("bytes allowed"), "{e}");
+}
+
+#[test]
+fn a_file_behind_many_buffers_is_read_once_and_a_huge_one_never() {
+    let folder = std::env::temp_dir().join(format!("sinew-buffers-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let sparse = |name: &str, size: u64| {
+        std::fs::File::create(folder.join(name)).unwrap().set_len(size).unwrap();
+    };
+    sparse("a.bin", 8 << 20);
+    sparse("huge.bin", 3 << 30);
+    let read = |uri: &str| {
+        let mut json = File::new().json;
+        json["buffers"] = json!(vec![json!({ "byteLength": 60, "uri": uri }); 1000]);
+        import_bytes(json.to_string().as_bytes(), Some(&folder), "test.gltf", &Options::default())
+    };
+    let (many, huge) = (read("a.bin"), read("huge.bin"));
+    std::fs::remove_dir_all(&folder).unwrap();
+    many.unwrap();
+    let e = huge.unwrap_err().to_string();
+    assert!(e.starts_with("buffers[0].uri: asks for 3221225472 bytes"), "{e}");
+}
+
+/// Pictures of one grey, as data: 4×4, 8192×1, 1×8192, and the beginning of one of 16384×16384.
+#[cfg(feature = "pictures")]
+const PICTURES: [&str; 4] = [
+    "iVBORw0KGgoAAAANSUhEUgAAAAQAAAAECAAAAACMmsGiAAAADklEQVR42mNoAAIGVAIAUBQIAW1N4EkAAAAASUVORK5CYII=",
+    "iVBORw0KGgoAAAANSUhEUgAAIAAAAAABCAAAAABTIH+8AAAAH0lEQVR42u3BAQkAAAACoKY3vR2BmgIAAAAAAAAA9wYhWgDxR8gH0QAAAABJRU5ErkJggg==",
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAACAACAAAAAA+n3FsAAAAKElEQVR42u3CMQ0AAAACIKMb3Rg+DNIAAAAAAAAAAAAAAAAAAAAAZwNBwgDxrGlb9QAAAABJRU5ErkJggg==",
+    "iVBORw0KGgoAAAANSUhEUgAAQAAAAEAACAAAAACMo09YAAAAAElEQVQ1rwYeAAAAAElFTkSuQmCC",
+];
+
+/// As many primitives, materials, textures and images as there are places in `pictures`, material `i` with what `look` says.
+#[cfg(feature = "pictures")]
+fn pictured(pictures: &[usize], look: impl Fn(usize) -> Value) -> Import {
+    let mut file = File::new();
+    let primitive = file.primitive().clone();
+    let mut primitives = vec![primitive; pictures.len()];
+    primitives.iter_mut().enumerate().for_each(|(i, p)| p["material"] = json!(i));
+    file.json["meshes"][0]["primitives"] = json!(primitives);
+    let data = |&k: &usize| json!({ "uri": format!("data:image/png;base64,{}", PICTURES[k]) });
+    file.json["images"] = json!(pictures.iter().map(data).collect::<Vec<_>>());
+    let count = 0..pictures.len();
+    file.json["textures"] = json!(count.clone().map(|i| json!({ "source": i })).collect::<Vec<_>>());
+    file.json["materials"] = json!(count.map(look).collect::<Vec<_>>());
+    import_bytes(&file.bytes(), None, "test.glb", &Options { textures: true }).unwrap()
+}
+
+#[cfg(feature = "pictures")]
+#[test]
+fn materials_share_what_has_the_same_inputs() {
+    let import = pictured(&[0; 2000], |i| {
+        let pbr = json!({ "baseColorTexture": { "index": i }, "metallicRoughnessTexture": { "index": 0 } });
+        json!({ "pbrMetallicRoughness": pbr, "emissiveTexture": { "index": i } })
+    });
+    assert_eq!(import.asset.textures.len(), 3, "{:?}", import.warnings);
+    let maps = |m: &sinew::scene::Material| {
+        [m.diffuse_map, m.specular_map, m.emissive_map].map(|t| t.unwrap().texture)
+    };
+    let all: Vec<_> = import.asset.materials.iter().map(maps).collect();
+    assert!(all.len() == 2000 && all.iter().all(|m| *m == all[0]) && all[0][0] != all[0][1]);
+}
+
+#[cfg(feature = "pictures")]
+#[test]
+fn materials_that_nothing_drawn_uses_go_without_maps() {
+    let look = json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } });
+    let mut file = File::new();
+    file.json["images"] = json!([{ "uri": format!("data:image/png;base64,{}", PICTURES[0]) }]);
+    file.json["textures"] = json!([{ "source": 0 }]);
+    file.json["materials"] = json!([look, look]);
+    file.primitive()["material"] = json!(1);
+    let import = import_bytes(&file.bytes(), None, "test.glb", &Options { textures: true }).unwrap();
+    let maps: Vec<bool> = import.asset.materials.iter().map(|m| m.diffuse_map.is_some()).collect();
+    assert_eq!((maps, import.asset.textures.len()), (vec![false, true], 2));
+}
+
+#[cfg(feature = "pictures")]
+#[test]
+fn maps_without_room_are_left_out() {
+    // A wide picture and a tall one would meet in a grid of 8192×8192.
+    let import = pictured(&[1, 2], |_| {
+        json!({ "pbrMetallicRoughness": {
+            "baseColorTexture": { "index": 0 }, "metallicRoughnessTexture": { "index": 1 } } })
+    });
+    assert!(import.warnings[0].message.contains("more than 256 MiB"), "{:?}", import.warnings);
+    assert!(import.asset.materials[0].specular_map.is_none() && import.asset.textures.len() == 1);
+
+    // A picture beyond the limit is white.
+    let import = pictured(&[3], |_| json!({ "emissiveTexture": { "index": 0 } }));
+    assert_eq!(import.warnings[0].place, "images[0]");
+    assert!(import.warnings[0].message.contains("256 MiB"), "{:?}", import.warnings);
+    assert_eq!(import.asset.textures[0].levels(), [vec![255; 4]]);
+}
+
+#[test]
+fn a_normal_map_without_normals_leaves_a_surface_flat() {
+    let mut file = File::new();
+    let (uvs, n) = (file.floats("VEC2", &[0., 0., 1., 0., 1., 1., 0., 1., 0., 0.]), [0., 0., 1.].repeat(5));
+    let (normals, t) = (file.floats("VEC3", &n), file.floats("VEC4", &[1., 0., 0., 1.].repeat(5)));
+    file.primitive()["attributes"]["TEXCOORD_0"] = json!(uvs);
+    file.primitive()["attributes"]["TANGENT"] = json!(t);
+    file.primitive()["material"] = json!(0);
+    file.json["materials"] = json!([{ "normalTexture": { "index": 0 } }]);
+    let counts = |file: &File| {
+        let import = file.import();
+        let mesh = &import.asset.character.meshes()[0];
+        (mesh.normals.len(), mesh.tangents.len())
+    };
+    assert_eq!(counts(&file), (0, 0));
+    file.primitive()["attributes"].as_object_mut().unwrap().remove("TANGENT");
+    file.primitive()["attributes"]["NORMAL"] = json!(normals);
+    assert_eq!(counts(&file), (5, 5));
+    let turned = json!({ "KHR_texture_transform": { "rotation": 1.0 } });
+    file.json["materials"][0]["normalTexture"]["extensions"] = turned;
+    assert_eq!(counts(&file), (5, 0));
+}
+
+#[test]
+fn what_is_left_out_is_said() {
+    let mut file = skinned();
+    let uvs = file.floats("VEC2", &[0.0; 10]);
+    let (colors, joints) =
+        (file.floats("VEC4", &[1.0; 20]), file.primitive()["attributes"]["JOINTS_0"].clone());
+    file.primitive()["attributes"]["TEXCOORD_2"] = json!(uvs);
+    file.primitive()["attributes"]["COLOR_1"] = json!(colors);
+    file.primitive()["attributes"]["JOINTS_1"] = joints;
+    file.json["cameras"] = json!([
+        { "type": "perspective", "perspective": { "yfov": 0.7, "znear": 0.1, "aspectRatio": 1.5 } },
+        { "type": "orthographic", "orthographic": { "xmag": 2, "ymag": 1, "znear": 0.1, "zfar": 9 } }
+    ]);
+    file.json["nodes"][1]["camera"] = json!(0);
+    file.json["nodes"][2]["camera"] = json!(1);
+    let warnings: Vec<String> = file.import().warnings.iter().map(|w| w.to_string()).collect();
+    for word in [
+        "COLOR_0",
+        "TEXCOORD_1",
+        "joints but no weights",
+        "cameras[0]: its aspectRatio",
+        "cameras[1]: its xmag",
+    ] {
+        assert!(warnings.iter().any(|w| w.contains(word)), "{word}: {warnings:?}");
+    }
+}
+
+#[test]
+fn chains_of_small_scales_have_finite_bones() {
+    let mut file = File::new();
+    let leaf = |k: usize| json!({ "scale": [1e-8, 1e-8, 1e-8], "children": [k + 1] });
+    let mut nodes =
+        vec![json!({ "mesh": 0, "children": [1] }), json!({ "translation": [1, 0, 0], "children": [2] })];
+    nodes.extend((2..12).map(leaf));
+    nodes.push(json!({}));
+    file.json["nodes"] = json!(nodes);
+    let import = file.import();
+    let s = import.asset.character.skeleton();
+    assert!(s.ids().all(|b| s.tip(b).is_finite()));
 }

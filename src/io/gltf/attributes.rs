@@ -5,7 +5,7 @@ use super::document::Document;
 use super::draco::{self, Decoded};
 use super::error::Result;
 use super::warnings::Warnings;
-use crate::mesh::normals::{self, Weighting};
+use crate::mesh::normals;
 use crate::mesh::{MeshData, MorphTarget};
 use ::gltf::json::accessor::Type;
 use ::gltf::json::mesh::{Primitive, Semantic};
@@ -61,6 +61,7 @@ impl<'a> Source<'a> {
         }
         data.targets = self.targets()?;
         sane(data, self.place, w);
+        left_out(self.primitive, self.place, w);
         Ok(true)
     }
 
@@ -165,17 +166,45 @@ fn sane(data: &mut MeshData, place: &str, w: &mut Warnings) {
 }
 
 /// Add what follows from the rest: tangents where a normal map asks for them.
+///
+/// Without normals a surface is flat and given tangents mean nothing (section 3.7.2.1). A normal map that does not lie as the
+/// texture coordinates do gets its frame where it is looked up.
 pub(super) fn complete(doc: &Document, primitive: &Primitive, data: &mut MeshData) {
-    let material = primitive.material.and_then(|m| doc.root.materials.get(m.value()));
-    let Some(map) = material.and_then(|m| m.normal_texture.as_ref()) else { return };
-    let uvs = &data.uvs[(map.tex_coord as usize).min(1)];
-    if !data.tangents.is_empty() || uvs.len() != data.positions.len() {
+    if data.normals.is_empty() {
+        data.tangents.clear();
         return;
     }
-    if data.normals.is_empty() {
-        data.normals = normals::vertex(&data.positions, &data.triangles, Weighting::Angle);
-    }
-    if data.normals.len() == data.positions.len() {
+    let material = primitive.material.and_then(|m| doc.root.materials.get(m.value()));
+    let Some(map) = material.and_then(|m| m.normal_texture.as_ref()) else { return };
+    let moved = map.extensions.as_ref().is_some_and(|e| e.others.contains_key("KHR_texture_transform"));
+    let Some(uvs) = data.uvs.get(map.tex_coord as usize).filter(|_| !moved) else { return };
+    let count = data.positions.len();
+    if data.tangents.is_empty() && uvs.len() == count && data.normals.len() == count {
         data.tangents = normals::tangents(&data.positions, &data.normals, uvs, &data.triangles);
+    }
+}
+
+/// Say which attributes are left out.
+fn left_out(primitive: &Primitive, place: &str, w: &mut Warnings) {
+    let has = |semantic| accessor(primitive, semantic).is_some();
+    let semantics = primitive.attributes.keys().filter_map(|k| match k {
+        Checked::Valid(s) => Some(s),
+        Checked::Invalid => None,
+    });
+    for semantic in semantics {
+        let message = match *semantic {
+            Semantic::Colors(1..) => "has further vertex colours; only COLOR_0 is read",
+            Semantic::TexCoords(2..) => {
+                "has further texture coordinates; only TEXCOORD_0 and TEXCOORD_1 are read"
+            }
+            Semantic::Joints(n) if !has(Semantic::Weights(n)) => {
+                "has a set of joints but no weights; it and the sets after it are left out"
+            }
+            Semantic::Weights(n) if !has(Semantic::Joints(n)) => {
+                "has a set of weights but no joints; it and the sets after it are left out"
+            }
+            _ => continue,
+        };
+        w.push(place, message);
     }
 }

@@ -3,6 +3,7 @@
 use super::document::Document;
 use super::error::{GltfError, Result, entry, value};
 use super::geometry::Runs;
+use super::mend::NO_NODE;
 use super::nodes::Nodes;
 use super::warnings::Warnings;
 use crate::clip::{Clip, Curve, Interpolation, Target, Track};
@@ -26,7 +27,8 @@ pub(super) fn animated(doc: &Document) -> Vec<bool> {
 pub(super) fn build(doc: &Document, nodes: &Nodes, runs: &Runs, w: &mut Warnings) -> Result<Vec<Clip>> {
     let one = |(a, animation): (usize, &Animation)| {
         let mut clip = Clip { name: clip_name(animation, a), tracks: Vec::new() };
-        for (c, channel) in animation.channels.iter().enumerate() {
+        let channels = animation.channels.iter().enumerate();
+        for (c, channel) in channels.filter(|(_, c)| c.target.node.value() != NO_NODE as usize) {
             let place = format!("animations[{a}].channels[{c}]");
             clip.tracks.extend(track(doc, nodes, runs, animation, channel, &place, w)?);
         }

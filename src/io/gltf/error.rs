@@ -93,7 +93,7 @@ pub enum GltfError {
     },
     /// More data than the file can mean.
     #[error(
-        "{place}: asks for {asked} bytes of decoded data, more than the {limit} bytes allowed to a file of this size"
+        "{place}: asks for {asked} bytes of data, more than the {limit} bytes allowed to a file of this size"
     )]
     TooLarge {
         /// What asks.

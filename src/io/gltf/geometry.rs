@@ -12,7 +12,10 @@ use crate::io::PrimitiveSource;
 use crate::mesh::{MaterialId, Mesh, MeshData};
 use ::gltf::json::mesh::{Mode, Primitive};
 use ::gltf::json::validation::Checked;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Bytes that a frame keeps for each vertex of an instance: position, normal, tangent.
+const INSTANCE_BYTES: u64 = 40;
 
 /// Where the morph weights of each node start, and how many it has.
 #[derive(Default)]
@@ -35,6 +38,8 @@ pub(super) struct Geometry {
     pub runs: Runs,
     /// A primitive has no material of its own, so the default one is needed.
     pub default_material: bool,
+    /// Materials that primitives with triangles use.
+    pub drawn: BTreeSet<usize>,
     done: BTreeMap<(usize, usize), Option<Built>>,
 }
 
@@ -95,7 +100,8 @@ impl Geometry {
                     Binding::Bone(bone(nodes, node, || place.clone())?)
                 }
             };
-            doc.charge(256, &place)?;
+            let bytes = 256 + count as u64 * INSTANCE_BYTES;
+            doc.charge(bytes, &format!("nodes[{node}] (an instance of {count} vertices of {place})"))?;
             self.instances.push(Instance { mesh: built.mesh, binding, first_weight: run });
             self.sources.push(PrimitiveSource { node: node as u32, mesh: mesh as u32, primitive: p as u32 });
         }
@@ -181,7 +187,11 @@ impl Geometry {
             w.push(place, "is made of points or lines, which are not drawn; its vertices were kept");
         }
         data.triangles = triangles(mode, indices, data.positions.len(), place, w)?;
-        data.material = Some(self.material(doc, primitive, place)?);
+        let material = self.material(doc, primitive, place)?;
+        if !data.triangles.is_empty() {
+            self.drawn.insert(material.0 as usize);
+        }
+        data.material = Some(material);
         attributes::complete(doc, primitive, &mut data);
         Mesh::new(data).map_err(|source| GltfError::Mesh { place: place.into(), source })
     }

@@ -1,8 +1,10 @@
 //! Materials: what glTF says of a surface, as a Blinn-Phong material. The mapping itself is in `surface.rs`.
 
+use super::bake::Workflow;
 use super::document::Document;
 use super::error::Result;
-use super::textures::{Slot, Textures, Workflow};
+use super::geometry::Geometry;
+use super::textures::{Slot, Textures};
 use super::warnings::Warnings;
 use crate::io::Options;
 use crate::scene::{AlphaMode, Material, Texture};
@@ -17,22 +19,23 @@ pub(super) struct Looks {
     pub textures: Vec<Texture>,
 }
 
-/// All materials.
+/// All materials; those that nothing drawn uses go without maps.
 pub(super) fn build(
     doc: &Document,
     base: Option<&Path>,
     options: &Options,
-    default: bool,
+    geometry: &Geometry,
     w: &mut Warnings,
 ) -> Result<Looks> {
-    let slots = doc.root.materials.iter().flat_map(slots);
-    let mut textures = Textures::load(doc, base, slots, options, w);
+    let drawn = geometry.drawn.iter().filter_map(|&i| doc.root.materials.get(i));
+    let mut textures = Textures::load(doc, base, drawn.flat_map(slots), options, w);
     let mut materials = Vec::with_capacity(doc.root.materials.len() + 1);
     for (i, m) in doc.root.materials.iter().enumerate() {
         let name = m.name.clone().unwrap_or_else(|| format!("material_{i}"));
+        textures.skip(!geometry.drawn.contains(&i));
         materials.push(one(m, name, &mut textures, w));
     }
-    if default {
+    if geometry.default_material {
         materials.push(one(&json::Material::default(), "default".into(), &mut textures, w));
     }
     Ok(Looks { materials, textures: textures.finish() })

@@ -6,6 +6,9 @@ use ::gltf::json::{self, Root};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
+/// The node of a channel that is left out.
+pub(super) const NO_NODE: u32 = u32::MAX;
+
 /// Parse, check the version, mend, and give the JSON its types.
 pub(super) fn root(text: &[u8], warnings: &mut Warnings) -> Result<Root> {
     serde_json::from_value(mended(text, warnings)?).or_else(|source| {
@@ -109,20 +112,19 @@ fn texture_sources(value: &mut Value) {
 }
 
 /// A channel without a node points by path (KHR_animation_pointer). A path to a node's transform or weights is as good as a
-/// node; of anything else we have nothing that could move.
+/// node; of anything else we have nothing that could move. Such channels keep their place and get [`NO_NODE`].
 fn channels_without_node(value: &mut Value, warnings: &mut Warnings) {
     for (a, animation) in objects(value, "animations").enumerate() {
         let Some(channels) = animation.get_mut("channels").and_then(Value::as_array_mut) else { continue };
-        let mut c = 0;
-        channels.retain_mut(|channel| {
-            let kept = channel.get_mut("target").is_none_or(|t| t.get("node").is_some() || follow_pointer(t));
-            if !kept {
+        for (c, channel) in channels.iter_mut().enumerate() {
+            let Some(target) = channel.get_mut("target") else { continue };
+            let named = target.get("node").is_some_and(|n| n.as_u64() != Some(NO_NODE as u64));
+            if !named && !follow_pointer(target) {
                 let place = format!("animations[{a}].channels[{c}]");
                 warnings.push(place, "its target is no node; the channel is left out");
+                *target = json!({ "node": NO_NODE, "path": "translation" });
             }
-            c += 1;
-            kept
-        });
+        }
     }
 }
 

@@ -5,6 +5,7 @@
 
 mod accessor;
 mod attributes;
+mod bake;
 mod clips;
 mod compressed;
 mod container;
@@ -52,10 +53,7 @@ use warnings::Warnings;
 pub fn import(path: &Path, options: &Options) -> std::result::Result<Import, GltfError> {
     let file = || path.display().to_string();
     let read = |source| GltfError::Read { place: "file".into(), file: file(), source };
-    if path.is_dir() {
-        return Err(read(std::io::Error::from(std::io::ErrorKind::IsADirectory)));
-    }
-    let bytes = std::fs::read(path).map_err(read)?;
+    let bytes = super::read_file(path).map_err(read)?;
     let folder = path.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p });
     import_bytes(&bytes, folder, &file(), options)
 }
@@ -82,7 +80,7 @@ fn assemble(doc: &Document, base: Option<&Path>, options: &Options, mut w: Warni
     let nodes = nodes::build(doc, &clips::animated(doc), &mut w)?;
     let geometry = geometry::build(doc, &nodes, &mut w)?;
     let clips = clips::build(doc, &nodes, &geometry.runs, &mut w)?;
-    let looks = material::build(doc, base, options, geometry.default_material, &mut w)?;
+    let looks = material::build(doc, base, options, &geometry, &mut w)?;
     let character =
         Character::new(nodes.skeleton, geometry.meshes, geometry.instances, geometry.rest_weights, clips)?;
     let cameras = mounts::cameras(doc, &nodes.in_scene, &nodes.bone_of, &mut w)?;

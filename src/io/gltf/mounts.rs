@@ -25,6 +25,7 @@ pub(super) fn cameras(
         let json = &doc.root.nodes[node];
         let Some(index) = json.camera.map(|c| c.value()) else { continue };
         let camera = entry(&doc.root.cameras, index, "camera", || format!("nodes[{node}].camera"))?;
+        ignored(camera, &format!("cameras[{index}]"), w);
         let Some((projection, near)) = projection(camera) else {
             w.push(format!("cameras[{index}]"), "has no usable projection; left out");
             continue;
@@ -35,6 +36,16 @@ pub(super) fn cameras(
         out.push(MountedCamera { name, bone: bones[node], projection, near });
     }
     Ok(out)
+}
+
+/// Pictures have their own shape, so a camera says only how much is seen from bottom to top.
+fn ignored(camera: &json::Camera, place: &str, w: &mut Warnings) {
+    if camera.perspective.as_ref().is_some_and(|p| p.aspect_ratio.is_some()) {
+        w.push(place, "its aspectRatio is ignored; that of the picture counts");
+    }
+    if camera.perspective.is_none() && camera.orthographic.as_ref().is_some_and(|o| o.xmag != o.ymag) {
+        w.push(place, "its xmag is ignored; ymag and the shape of the picture count");
+    }
 }
 
 fn projection(camera: &json::Camera) -> Option<(Projection, f32)> {

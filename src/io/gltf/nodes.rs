@@ -195,6 +195,8 @@ fn point(descs: &mut [BoneDesc], tree: &Skeleton, node_of: &[u32], doc: &Documen
             true => mean,
             false => inherited(descs, i),
         };
+        // Scales divide a tip down a chain of leaves; one that became infinite has no meaning.
+        let tip = if tip.length().is_finite() { tip } else { Vec3::ZERO };
         descs[i].length = tip.length();
         if let Some(direction) = tip.try_normalize() {
             descs[i].aim = rotation::unit(Quat::from_rotation_arc(Vec3::X, direction));

@@ -1,18 +1,24 @@
 //! Pictures: bytes from the file or beside it, decoded on all cores.
 
 use super::document::Document;
-use super::uri;
+use super::uri::Source;
 use super::warnings::Warnings;
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Longest side that is decoded, pixels.
 const SIDE: u32 = 1 << 14;
-/// Decoded bytes that any file may ask for, and how many more for each byte of picture.
-const FREE_BYTES: u64 = 512 << 20;
-const BYTES_A_BYTE: u64 = 64;
+/// Bytes that the decoded pictures of a file may take together, mip levels included: twelve of 2048×2048, three of
+/// 4096×4096. The undecoded bytes of their files may take as many, and so may what is made of the pictures besides.
+pub(super) const PIXEL_BYTES: u64 = 256 << 20;
+
+/// Bytes of RGBA with mip levels, for sides up to [`SIDE`].
+pub(super) fn with_mips(width: usize, height: usize) -> u64 {
+    (4 * width as u64 * height as u64).saturating_mul(4).div_ceil(3)
+}
 
 /// Decoded RGBA, rows from the top.
 pub(super) struct Picture {
@@ -25,76 +31,137 @@ impl Picture {
     fn white() -> Self {
         Self { width: 1, height: 1, rgba: vec![255; 4] }
     }
+}
 
-    /// The pixel that covers a place of another, finer grid.
-    pub fn at(&self, (x, y): (usize, usize), (width, height): (usize, usize)) -> [u8; 4] {
-        let i = (y * self.height / height * self.width + x * self.width / width) * 4;
-        [self.rgba[i], self.rgba[i + 1], self.rgba[i + 2], self.rgba[i + 3]]
+/// Pictures, each decoded once however many images name it.
+pub(super) struct Pictures {
+    /// The pictures.
+    pub list: Vec<Picture>,
+    of: Vec<Option<usize>>,
+}
+
+impl Pictures {
+    /// Where in the list the picture of an image is.
+    pub fn of(&self, image: usize) -> Option<usize> {
+        *self.of.get(image)?
     }
 }
 
+/// What an image is the same as another by.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+enum Key<'a> {
+    Uri(Source<'a>),
+    View(usize),
+}
+
+/// Bytes that may still be read, and decoded.
+struct Budget {
+    encoded: u64,
+    pixels: u64,
+}
+
+type Job<'a> = Result<Cow<'a, [u8]>, String>;
+
 /// Decode the pictures that `wanted` names. What cannot be read is plain white and a warning.
-pub(super) fn load(
-    doc: &Document,
-    base: Option<&Path>,
-    wanted: &[bool],
-    w: &mut Warnings,
-) -> Vec<Option<Picture>> {
+pub(super) fn load(doc: &Document, base: Option<&Path>, wanted: &[bool], w: &mut Warnings) -> Pictures {
     // Read the bytes and check the sizes in order, so that the outcome does not depend on threads.
-    let mut left = FREE_BYTES;
-    let mut jobs: Vec<Option<Cow<[u8]>>> = Vec::with_capacity(wanted.len());
-    let mut out: Vec<Option<Picture>> = Vec::with_capacity(wanted.len());
-    for (i, wanted) in wanted.iter().enumerate() {
-        let job = if *wanted { Some(bytes(doc, base, i).and_then(|b| admit(b, &mut left))) } else { None };
-        out.push(None);
-        jobs.push(match job {
-            Some(Ok(bytes)) => Some(bytes),
-            Some(Err(why)) => {
-                w.push(format!("images[{i}]"), format!("{why}; plain white is used"));
-                out[i] = Some(Picture::white());
-                None
+    let mut budget = Budget { encoded: PIXEL_BYTES, pixels: PIXEL_BYTES };
+    let mut known = BTreeMap::new();
+    let (mut jobs, mut images): (Vec<Job>, Vec<usize>) = Default::default();
+    let mut of = vec![None; wanted.len()];
+    for i in (0..wanted.len()).filter(|&i| wanted[i]) {
+        let job = match key(doc, base, i) {
+            Ok(key) => {
+                if let Some(&same) = known.get(&key) {
+                    of[i] = Some(same);
+                    continue;
+                }
+                let job = budget.bytes(doc, &key, i).and_then(|b| budget.admit(b));
+                known.insert(key, jobs.len());
+                job
             }
-            None => None,
-        });
+            Err(why) => Err(why),
+        };
+        of[i] = Some(jobs.len());
+        jobs.push(job);
+        images.push(i);
     }
 
     // Decode; each worker takes the next picture that is left.
-    for (i, decoded) in decode_all(&jobs).into_iter().enumerate() {
-        match decoded {
-            Some(Ok(p)) => out[i] = Some(p),
-            Some(Err(why)) => {
-                w.push(format!("images[{i}]"), format!("{why}; plain white is used"));
-                out[i] = Some(Picture::white());
-            }
-            None => {}
-        }
+    let mut list = Vec::with_capacity(jobs.len());
+    for (i, (decoded, job)) in images.into_iter().zip(decode_all(&jobs).into_iter().zip(&jobs)) {
+        let refused = || Err(job.as_ref().err().cloned().unwrap_or_default());
+        list.push(decoded.unwrap_or_else(refused).unwrap_or_else(|why| {
+            w.push(format!("images[{i}]"), format!("{why}; plain white is used"));
+            Picture::white()
+        }));
     }
-    out
+    Pictures { list, of }
 }
 
-fn bytes<'a>(doc: &'a Document, base: Option<&Path>, i: usize) -> Result<Cow<'a, [u8]>, String> {
+fn key<'a>(doc: &'a Document, base: Option<&Path>, i: usize) -> Result<Key<'a>, String> {
     let image = &doc.root.images[i];
-    let place = format!("images[{i}]");
     match (&image.uri, image.buffer_view) {
-        (Some(u), _) => uri::load(u, base, &place).map(Cow::Owned).map_err(|e| e.to_string()),
-        (None, Some(v)) => {
-            let (bytes, _) = doc.view(v.value(), &place).map_err(|e| e.to_string())?;
-            Ok(Cow::Borrowed(bytes))
-        }
+        (Some(u), _) => Source::of(u, base, &format!("images[{i}]")).map(Key::Uri).map_err(|e| e.to_string()),
+        (None, Some(v)) => Ok(Key::View(v.value())),
         (None, None) => Err("has neither a URI nor a buffer view".into()),
     }
 }
 
+impl Budget {
+    /// The undecoded bytes.
+    fn bytes<'a>(&mut self, doc: &'a Document, key: &Key, i: usize) -> Job<'a> {
+        let place = format!("images[{i}]");
+        match key {
+            Key::Uri(source) => {
+                let size = source.size(&place).map_err(|e| e.to_string())?;
+                if size > self.encoded {
+                    return Err(format!("has {size} bytes, too many; {}", limit()));
+                }
+                self.encoded -= size;
+                source.read(&place).map(Cow::Owned).map_err(|e| e.to_string())
+            }
+            Key::View(v) => {
+                let (bytes, _) = doc.view(*v, &place).map_err(|e| e.to_string())?;
+                Ok(Cow::Borrowed(bytes))
+            }
+        }
+    }
+
+    /// Let a picture pass if there is room for what it decodes to.
+    #[cfg(feature = "pictures")]
+    fn admit<'a>(&mut self, bytes: Cow<'a, [u8]>) -> Job<'a> {
+        let (width, height) = reader(&bytes)?.into_dimensions().map_err(|e| e.to_string())?;
+        let sides = width <= SIDE && height <= SIDE;
+        let needed = if sides { with_mips(width as usize, height as usize) } else { u64::MAX };
+        if needed > self.pixels {
+            return Err(format!("{width}×{height} pixels are too many; {}", limit()));
+        }
+        self.pixels -= needed;
+        Ok(bytes)
+    }
+
+    #[cfg(not(feature = "pictures"))]
+    fn admit<'a>(&mut self, _: Cow<'a, [u8]>) -> Job<'a> {
+        let _ = (SIDE, self.pixels);
+        Err("pictures are not decoded in this build (feature `pictures`)".into())
+    }
+}
+
+fn limit() -> String {
+    format!("the pictures of a file may take {} MiB together", PIXEL_BYTES >> 20)
+}
+
 type Decoded = Option<Result<Picture, String>>;
 
-fn decode_all(jobs: &[Option<Cow<[u8]>>]) -> Vec<Decoded> {
+fn decode_all(jobs: &[Job]) -> Vec<Decoded> {
     let slots: Vec<Mutex<Decoded>> = jobs.iter().map(|_| Mutex::new(None)).collect();
     let next = AtomicUsize::new(0);
     let work = || {
         loop {
             let i = next.fetch_add(1, Ordering::Relaxed);
             let Some(job) = jobs.get(i) else { return };
-            if let (Some(bytes), Ok(mut slot)) = (job, slots[i].lock()) {
+            if let (Ok(bytes), Ok(mut slot)) = (job, slots[i].lock()) {
                 *slot = Some(decode(bytes));
             }
         }
@@ -108,26 +175,14 @@ fn decode_all(jobs: &[Option<Cow<[u8]>>]) -> Vec<Decoded> {
     slots.into_iter().map(|s| s.into_inner().unwrap_or(None)).collect()
 }
 
-/// Let a picture pass if what it decodes to is in proportion.
-#[cfg(feature = "pictures")]
-fn admit<'a>(bytes: Cow<'a, [u8]>, left: &mut u64) -> Result<Cow<'a, [u8]>, String> {
-    let (width, height) = reader(&bytes)?.into_dimensions().map_err(|e| e.to_string())?;
-    *left = left.saturating_add(bytes.len() as u64 * BYTES_A_BYTE);
-    let needed = 4 * width as u64 * height as u64;
-    if width > SIDE || height > SIDE || needed > *left {
-        return Err(format!("{width}×{height} pixels are too many for a file of this size"));
-    }
-    *left -= needed;
-    Ok(bytes)
-}
-
 #[cfg(feature = "pictures")]
 fn decode(bytes: &[u8]) -> Result<Picture, String> {
     let mut reader = reader(bytes)?;
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(SIDE);
     limits.max_image_height = Some(SIDE);
-    limits.max_alloc = Some(FREE_BYTES.saturating_add(bytes.len() as u64 * BYTES_A_BYTE));
+    // Decoders may hold 16 bits a channel.
+    limits.max_alloc = Some(2 * PIXEL_BYTES);
     reader.limits(limits);
     let rgba = reader.decode().map_err(|e| e.to_string())?.into_rgba8();
     Ok(Picture { width: rgba.width() as usize, height: rgba.height() as usize, rgba: rgba.into_raw() })
@@ -137,12 +192,6 @@ fn decode(bytes: &[u8]) -> Result<Picture, String> {
 fn reader(bytes: &[u8]) -> Result<image::ImageReader<std::io::Cursor<&[u8]>>, String> {
     let reader = image::ImageReader::new(std::io::Cursor::new(bytes));
     reader.with_guessed_format().map_err(|e| e.to_string())
-}
-
-#[cfg(not(feature = "pictures"))]
-fn admit<'a>(_: Cow<'a, [u8]>, _: &mut u64) -> Result<Cow<'a, [u8]>, String> {
-    let _ = (SIDE, FREE_BYTES, BYTES_A_BYTE);
-    Err("pictures are not decoded in this build (feature `pictures`)".into())
 }
 
 #[cfg(not(feature = "pictures"))]

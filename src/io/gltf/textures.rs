@@ -1,13 +1,12 @@
 //! Textures: which picture, how it lies on a surface, how it is sampled; and pairs of them baked into Blinn-Phong maps.
 
+use super::bake::{self, Grid, Size, Workflow};
 use super::document::Document;
-use super::pictures::{self, Picture};
-use super::surface::{Gloss, Phong, SHARPEST};
+use super::pictures::{self, PIXEL_BYTES, Pictures, with_mips};
 use super::warnings::Warnings;
-use crate::image::color::{LINEAR_OF_SRGB8, srgb8};
 use crate::io::Options;
 use crate::scene::{Filter, Texture, TextureId, TextureRef, WrapMode};
-use ::gltf::json::texture::{Info, MagFilter, Sampler, WrappingMode};
+use ::gltf::json::texture::{Info, MagFilter, MinFilter, Sampler, WrappingMode};
 use ::gltf::json::validation::Checked;
 use glam::{Affine2, Vec2, Vec3};
 use serde_json::{Map, Value};
@@ -58,56 +57,31 @@ impl Slot {
     }
 }
 
-/// What the second texture of a baked pair holds, and the constants beside it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Workflow {
-    /// Green: roughness; blue: metallic.
-    Metallic { metallic: f32, roughness: f32 },
-    /// RGB: specular colour (sRGB); alpha: glossiness.
-    Specular { specular: Vec3, glossiness: f32 },
-}
-
-impl Workflow {
-    /// Coefficients for a diffuse or base colour, and a pixel of the second texture (white without one).
-    pub fn phong(&self, color: Vec3, pixel: [u8; 4]) -> Phong {
-        self.shade(&Gloss::new(self.roughness(pixel)), color, pixel)
-    }
-
-    fn roughness(&self, pixel: [u8; 4]) -> f32 {
-        match *self {
-            Self::Metallic { roughness, .. } => roughness * pixel[1] as f32 / 255.0,
-            Self::Specular { glossiness, .. } => 1.0 - glossiness * pixel[3] as f32 / 255.0,
-        }
-    }
-
-    /// The byte that alone decides the roughness.
-    fn gloss_byte(&self, pixel: [u8; 4]) -> usize {
-        match self {
-            Self::Metallic { .. } => pixel[1] as usize,
-            Self::Specular { .. } => pixel[3] as usize,
-        }
-    }
-
-    fn shade(&self, gloss: &Gloss, color: Vec3, pixel: [u8; 4]) -> Phong {
-        match *self {
-            Self::Metallic { metallic, .. } => gloss.metallic(color, metallic * pixel[2] as f32 / 255.0),
-            Self::Specular { specular, .. } => gloss.specular(color, specular * linear(pixel)),
-        }
-    }
-}
-
-/// Baked maps; the material's own factors are then 1, and its exponent is [`SHARPEST`].
+/// Baked maps; the material's own factors are then 1, and its exponent is [`super::surface::SHARPEST`].
 pub(super) struct Baked {
     pub diffuse: Option<TextureRef>,
     pub specular: Option<TextureRef>,
 }
 
+/// Where a texture repeats and how it is filtered, in a form that has an order.
+type Sampling = [u8; 3];
+
+/// All that a baked pair follows from: pictures, sampling, whether they lie alike, factors.
+type Inputs = ([Option<usize>; 2], [Sampling; 2], bool, Vec<u32>);
+
 /// Pictures of the file, and the textures made of them so far.
 pub(super) struct Textures<'a> {
     doc: &'a Document<'a>,
-    pictures: Vec<Option<Picture>>,
+    pictures: Pictures,
+    /// The texture that holds a picture's pixels now.
+    holder: Vec<Option<TextureId>>,
     made: Vec<Texture>,
-    of: BTreeMap<(usize, Option<usize>, bool), TextureId>,
+    plain: BTreeMap<(usize, Sampling, bool), TextureId>,
+    baked: BTreeMap<Inputs, [TextureId; 2]>,
+    /// Bytes that may still be made of the pictures.
+    left: u64,
+    /// The material at hand goes without maps.
+    skip: bool,
 }
 
 impl<'a> Textures<'a> {
@@ -122,29 +96,46 @@ impl<'a> Textures<'a> {
         let mut wanted = vec![false; doc.root.images.len()];
         for slot in slots.filter(|_| options.textures) {
             match source(doc, slot.texture).map(|s| wanted.get_mut(s)) {
-                Some(Some(flag)) => *flag = true,
+                Some(Some(flag)) => {
+                    *flag = true;
+                    minified(doc, slot.texture, w);
+                }
                 _ => {
                     w.push(format!("textures[{}]", slot.texture), "has no picture that can be read; left out")
                 }
             }
         }
         let pictures = pictures::load(doc, base, &wanted, w);
-        Self { doc, pictures, made: Vec::new(), of: BTreeMap::new() }
+        let holder = vec![None; pictures.list.len()];
+        let (made, plain, baked) = Default::default();
+        Self { doc, pictures, holder, made, plain, baked, left: PIXEL_BYTES, skip: false }
+    }
+
+    /// Leave the materials to come without maps, or no longer.
+    pub fn skip(&mut self, skip: bool) {
+        self.skip = skip;
     }
 
     /// A texture as the file has it; `None` where it is missing or pictures are left out.
     pub fn plain(&mut self, slot: Slot, srgb: bool, w: &mut Warnings) -> Option<TextureRef> {
         let picture = self.picture(slot)?;
-        let json = self.doc.root.textures.get(slot.texture)?;
-        let sampler = json.sampler.map(|s| s.value());
-        let key = (source(self.doc, slot.texture)?, sampler, srgb);
-        let id = match self.of.get(&key) {
+        let (wrap, filter) = self.sampling(slot);
+        let key = (picture, code(wrap, filter), srgb);
+        let id = match self.plain.get(&key) {
             Some(id) => *id,
             None => {
-                let rgba = picture.rgba.clone();
-                let (width, height) = (picture.width, picture.height);
-                let id = self.push(width, height, rgba, srgb, slot)?;
-                self.of.insert(key, id);
+                let (width, height) = self.size(picture);
+                // The first texture takes the pixels over; only further ones are copies.
+                let rgba = match self.holder[picture] {
+                    None => std::mem::take(&mut self.pictures.list[picture].rgba),
+                    Some(_) => {
+                        self.afford(with_mips(width, height), w)?;
+                        self.pixels(picture).to_vec()
+                    }
+                };
+                let id = self.push((width, height), rgba, srgb, slot)?;
+                self.holder[picture].get_or_insert(id);
+                self.plain.insert(key, id);
                 id
             }
         };
@@ -153,7 +144,8 @@ impl<'a> Textures<'a> {
 
     /// Diffuse and specular maps of a colour texture and a second one, pixel by pixel in the finer of their grids.
     ///
-    /// Where they lie differently on the surface, each keeps its own layout and sees the other's mean.
+    /// Where they lie differently on the surface, each keeps its own layout and sees the other's mean. Materials of the
+    /// same inputs share the maps. `None` without pictures, or where there is no room for more maps.
     pub fn bake(
         &mut self,
         color: Option<Slot>,
@@ -162,58 +154,77 @@ impl<'a> Textures<'a> {
         workflow: Workflow,
         w: &mut Warnings,
     ) -> Option<Baked> {
-        let white = Picture { width: 1, height: 1, rgba: vec![255; 4] };
         let get = |s: Option<Slot>| s.and_then(|s| self.picture(s).map(|p| (s, p)));
         let (a, b) = (get(color), get(second));
         let (slot_a, slot_b) = (a.map(|a| a.0), b.map(|b| b.0));
         let (slot_a, slot_b) = (slot_a.or(slot_b)?, slot_b.or(slot_a)?);
-        let (pa, pb) = (a.map_or(&white, |a| a.1), b.map_or(&white, |b| b.1));
-        let table: Vec<Gloss> = (0..=255).map(|i| Gloss::new(workflow.roughness([i; 4]))).collect();
-        let shade = |pixel: [u8; 4], second: [u8; 4]| {
-            workflow.shade(&table[workflow.gloss_byte(second)], factor * linear(pixel), second)
-        };
-        let (diffuse, specular, size_a, size_b);
-        if slot_a.layout_equals(&slot_b) {
-            size_a = (pa.width.max(pb.width), pa.height.max(pb.height));
-            size_b = size_a;
-            let at = |x, y| (pa.at((x, y), size_a), pb.at((x, y), size_a));
-            diffuse = map(size_a, |x, y| diffuse_texel(&shade(at(x, y).0, at(x, y).1), at(x, y).0[3]));
-            specular = map(size_a, |x, y| specular_texel(&shade(at(x, y).0, at(x, y).1)));
-        } else {
+        let alike = slot_a.layout_equals(&slot_b);
+        if !alike {
             w.push(
                 "materials",
                 "colour and roughness textures lie differently; each was combined with the other's mean",
             );
-            (size_a, size_b) = ((pa.width, pa.height), (pb.width, pb.height));
-            let (mean_a, mean_b) = (mean(pa), mean(pb));
-            diffuse = map(size_a, |x, y| {
-                let p = pa.at((x, y), size_a);
-                diffuse_texel(&shade(p, mean_b), p[3])
-            });
-            specular = map(size_b, |x, y| specular_texel(&shade(mean_a, pb.at((x, y), size_b))));
         }
-        let diffuse = self.push(size_a.0, size_a.1, diffuse, true, slot_a).and_then(|id| lay(id, slot_a, w));
-        let specular =
-            self.push(size_b.0, size_b.1, specular, true, slot_b).and_then(|id| lay(id, slot_b, w));
-        Some(Baked { diffuse, specular })
+        let samplings = [slot_a, slot_b].map(|s| self.sampling(s));
+        let codes = samplings.map(|(wrap, filter)| code(wrap, filter));
+        let pictures = [a.map(|a| a.1), b.map(|b| b.1)];
+        let key = (pictures, codes, alike, workflow.bits(factor));
+        let [diffuse, specular] = match self.baked.get(&key) {
+            Some(ids) => *ids,
+            None => {
+                let srgb = [true, matches!(workflow, Workflow::Specular { .. })];
+                let own = pictures.map(|p| p.map_or((1, 1), |p| self.size(p)));
+                let sizes = bake::sizes(own[0], own[1], alike);
+                self.afford(sizes.iter().map(|&(width, height)| with_mips(width, height)).sum(), w)?;
+                let grid = |k: usize| {
+                    let rgba = pictures[k].map_or(&[255; 4][..], |p| self.pixels(p));
+                    Grid { size: own[k], rgba, wrap: samplings[k].0, srgb: srgb[k] }
+                };
+                let [diffuse, specular] = bake::bake(&grid(0), &grid(1), alike, factor, workflow);
+                let diffuse = self.push(sizes[0], diffuse, true, slot_a)?;
+                let ids = [diffuse, self.push(sizes[1], specular, true, slot_b)?];
+                self.baked.insert(key, ids);
+                ids
+            }
+        };
+        Some(Baked { diffuse: lay(diffuse, slot_a, w), specular: lay(specular, slot_b, w) })
     }
 
-    fn picture(&self, slot: Slot) -> Option<&Picture> {
-        self.pictures.get(source(self.doc, slot.texture)?)?.as_ref()
+    /// Take bytes out of what may still be made.
+    fn afford(&mut self, bytes: u64, w: &mut Warnings) -> Option<()> {
+        let Some(left) = self.left.checked_sub(bytes) else {
+            let limit = PIXEL_BYTES >> 20;
+            w.push("materials", format!("maps made for them would take more than {limit} MiB; left out"));
+            return None;
+        };
+        self.left = left;
+        Some(())
     }
 
-    fn push(
-        &mut self,
-        width: usize,
-        height: usize,
-        rgba: Vec<u8>,
-        srgb: bool,
-        slot: Slot,
-    ) -> Option<TextureId> {
-        let json = self.doc.root.textures.get(slot.texture)?;
-        let sampler = json.sampler.and_then(|s| self.doc.root.samplers.get(s.value()));
-        let (wrap, filter) = sampling(sampler);
-        let texture = Texture::new(width as u32, height as u32, rgba, srgb, wrap, filter).ok()?;
+    fn picture(&self, slot: Slot) -> Option<usize> {
+        self.pictures.of(source(self.doc, slot.texture)?).filter(|_| !self.skip)
+    }
+
+    fn size(&self, picture: usize) -> Size {
+        (self.pictures.list[picture].width, self.pictures.list[picture].height)
+    }
+
+    fn pixels(&self, picture: usize) -> &[u8] {
+        match self.holder[picture] {
+            Some(id) => &self.made[id.0 as usize].levels()[0],
+            None => &self.pictures.list[picture].rgba,
+        }
+    }
+
+    fn sampling(&self, slot: Slot) -> ([WrapMode; 2], Filter) {
+        let json = self.doc.root.textures.get(slot.texture);
+        let sampler = json.and_then(|t| t.sampler).and_then(|s| self.doc.root.samplers.get(s.value()));
+        sampling(sampler)
+    }
+
+    fn push(&mut self, size: Size, rgba: Vec<u8>, srgb: bool, slot: Slot) -> Option<TextureId> {
+        let (wrap, filter) = self.sampling(slot);
+        let texture = Texture::new(size.0 as u32, size.1 as u32, rgba, srgb, wrap, filter).ok()?;
         self.made.push(texture);
         Some(TextureId(self.made.len() as u32 - 1))
     }
@@ -243,6 +254,24 @@ fn lay(texture: TextureId, slot: Slot, w: &mut Warnings) -> Option<TextureRef> {
     Some(TextureRef { texture, uv_set: slot.uv_set as u8, transform: slot.transform })
 }
 
+/// Say where a picture is asked to be made smaller in another way than ours.
+fn minified(doc: &Document, texture: usize, w: &mut Warnings) {
+    let Some(index) = doc.root.textures[texture].sampler.map(|s| s.value()) else { return };
+    let Some(sampler) = doc.root.samplers.get(index) else { return };
+    let ours = match sampling(Some(sampler)).1 {
+        Filter::Nearest => MinFilter::NearestMipmapNearest,
+        Filter::Trilinear => MinFilter::LinearMipmapLinear,
+    };
+    if sampler.min_filter.is_some_and(|f| f != Checked::Valid(ours)) {
+        let message = "its minFilter is ignored; mip levels are mixed linearly, or taken nearest where magFilter is NEAREST";
+        w.push(format!("samplers[{index}]"), message);
+    }
+}
+
+fn code(wrap: [WrapMode; 2], filter: Filter) -> Sampling {
+    [wrap[0] as u8, wrap[1] as u8, filter as u8]
+}
+
 fn sampling(sampler: Option<&Sampler>) -> ([WrapMode; 2], Filter) {
     let Some(s) = sampler else { return Default::default() };
     let wrap = |w: Checked<WrappingMode>| match w {
@@ -255,35 +284,4 @@ fn sampling(sampler: Option<&Sampler>) -> ([WrapMode; 2], Filter) {
         _ => Filter::Trilinear,
     };
     ([wrap(s.wrap_s), wrap(s.wrap_t)], filter)
-}
-
-fn linear(pixel: [u8; 4]) -> Vec3 {
-    Vec3::new(
-        LINEAR_OF_SRGB8[pixel[0] as usize],
-        LINEAR_OF_SRGB8[pixel[1] as usize],
-        LINEAR_OF_SRGB8[pixel[2] as usize],
-    )
-}
-
-fn map((width, height): (usize, usize), texel: impl Fn(usize, usize) -> [u8; 4]) -> Vec<u8> {
-    let mut out = Vec::with_capacity(4 * width * height);
-    for y in 0..height {
-        (0..width).for_each(|x| out.extend(texel(x, y)));
-    }
-    out
-}
-
-fn diffuse_texel(p: &Phong, alpha: u8) -> [u8; 4] {
-    [srgb8(p.diffuse.x), srgb8(p.diffuse.y), srgb8(p.diffuse.z), alpha]
-}
-
-/// RGB: `k_s`; alpha: the power of [`SHARPEST`] that is `p`.
-fn specular_texel(p: &Phong) -> [u8; 4] {
-    let power = p.shininess.ln() / SHARPEST.ln();
-    [srgb8(p.specular.x), srgb8(p.specular.y), srgb8(p.specular.z), (power * 255.0 + 0.5) as u8]
-}
-
-fn mean(p: &Picture) -> [u8; 4] {
-    let count = (p.rgba.len() / 4).max(1) as u64;
-    std::array::from_fn(|k| (p.rgba.iter().skip(k).step_by(4).map(|&b| b as u64).sum::<u64>() / count) as u8)
 }

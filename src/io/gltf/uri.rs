@@ -13,14 +13,53 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
         .with_decode_allow_trailing_bits(true),
 );
 
-/// The bytes that `uri` means.
-pub(super) fn load(uri: &str, base: Option<&Path>, place: &str) -> Result<Vec<u8>> {
-    if uri.get(..5).is_some_and(|s| s.eq_ignore_ascii_case("data:")) {
-        return data(uri, place);
+/// Where the bytes of a URI are. Different URIs of one file are the same source.
+#[derive(Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Source<'u> {
+    /// In the URI itself.
+    Data(&'u str),
+    /// In a regular file, by its resolved path.
+    File(PathBuf),
+}
+
+impl<'u> Source<'u> {
+    /// What `uri` means; nothing is read yet.
+    pub fn of(uri: &'u str, base: Option<&Path>, place: &str) -> Result<Self> {
+        if uri.get(..5).is_some_and(|s| s.eq_ignore_ascii_case("data:")) {
+            return Ok(Self::Data(uri));
+        }
+        resolve(uri, base, place).map(Self::File)
     }
-    let path = resolve(uri, base, place)?;
-    let file = || path.display().to_string();
-    std::fs::read(&path).map_err(|source| GltfError::Read { place: place.into(), file: file(), source })
+
+    /// Bytes that reading will take at most.
+    pub fn size(&self, place: &str) -> Result<u64> {
+        match self {
+            Self::Data(uri) => Ok(uri.len() as u64),
+            Self::File(path) => {
+                let read = |source| GltfError::Read {
+                    place: place.into(),
+                    file: path.display().to_string(),
+                    source,
+                };
+                std::fs::metadata(path).map(|m| m.len()).map_err(read)
+            }
+        }
+    }
+
+    /// The bytes.
+    pub fn read(&self, place: &str) -> Result<Vec<u8>> {
+        match self {
+            Self::Data(uri) => data(uri, place),
+            Self::File(path) => {
+                let read = |source| GltfError::Read {
+                    place: place.into(),
+                    file: path.display().to_string(),
+                    source,
+                };
+                crate::io::read_file(path).map_err(read)
+            }
+        }
+    }
 }
 
 fn data(uri: &str, place: &str) -> Result<Vec<u8>> {
