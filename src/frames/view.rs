@@ -92,7 +92,7 @@ impl Framing {
         }
         // A lone point has no size; anything will do that is not zero.
         let extent = (self.high - self.low).max_element();
-        let size = extent.max(self.high.abs().max_element() * 1e-6).max(1e-18);
+        let size = extent.max(self.high.abs().max_element() * 1e-4).max(1e-18);
         let middle = (self.low + self.high) * 0.5;
         let (eye, projection) = match self.projection {
             Projection::Perspective { .. } => {

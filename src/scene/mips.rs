@@ -1,5 +1,6 @@
 //! Mip chains: each level the area-weighted mean of the one before, in linear light.
 
+use super::Content;
 use crate::image::color::{LINEAR_OF_SRGB8, srgb8};
 use std::sync::LazyLock;
 
@@ -7,14 +8,15 @@ use std::sync::LazyLock;
 static CODES: LazyLock<Vec<u8>> = LazyLock::new(|| (0..65536).map(|i| srgb8(i as f32 / 65535.0)).collect());
 
 /// All levels down to 1×1; each side is half of the one before, rounded down, at least 1.
-pub(super) fn chain(width: u32, height: u32, rgba: Vec<u8>, srgb: bool) -> Vec<Vec<u8>> {
+pub(super) fn chain(width: u32, height: u32, rgba: Vec<u8>, content: Content) -> Vec<Vec<u8>> {
     let (mut w, mut h) = (width as usize, height as usize);
     let mut levels = vec![rgba];
     while w > 1 || h > 1 {
-        let next = if srgb {
-            half_srgb(levels.last().expect("one"), w, h)
-        } else {
-            half_linear(&levels[levels.len() - 1], w, h)
+        let last = &levels[levels.len() - 1];
+        let next = match content {
+            Content::Color => half_srgb::<true>(last, w, h),
+            Content::ColorAndNumber => half_srgb::<false>(last, w, h),
+            Content::Numbers => half_linear(last, w, h),
         };
         levels.push(next);
         (w, h) = ((w / 2).max(1), (h / 2).max(1));
@@ -26,12 +28,12 @@ pub(super) fn chain(width: u32, height: u32, rgba: Vec<u8>, srgb: bool) -> Vec<V
 static LINEAR16: LazyLock<[u32; 256]> =
     LazyLock::new(|| std::array::from_fn(|i| (LINEAR_OF_SRGB8[i] * 65535.0 + 0.5) as u32));
 
-fn half_srgb(from: &[u8], w: usize, h: usize) -> Vec<u8> {
+fn half_srgb<const COVERAGE: bool>(from: &[u8], w: usize, h: usize) -> Vec<u8> {
     if w.is_multiple_of(2) && h.is_multiple_of(2) && from.as_chunks::<4>().0.iter().all(|t| t[3] == 255) {
         return half_opaque(from, w);
     }
     let (linear, codes) = (&*LINEAR_OF_SRGB8, &**CODES);
-    half::<true>(from, w, h, |c| linear[c as usize], |v| codes[(v * 65535.0 + 0.5) as usize & 0xffff])
+    half::<COVERAGE>(from, w, h, |c| linear[c as usize], |v| codes[(v * 65535.0 + 0.5) as usize & 0xffff])
 }
 
 /// The plain mean of four opaque texels: most pictures have even sides and no holes, and this takes a third of the time.
@@ -68,10 +70,10 @@ fn taps(side: usize) -> Vec<(usize, [f32; 3])> {
     (0..n).map(one).collect()
 }
 
-/// The next level. Colours count by their alpha, so that what is invisible does not bleed into what is not; in maps that hold no
-/// colours (`COLOR` is false) alpha means nothing and everything counts alike.
+/// The next level. Colours count by their alpha, so that what is invisible does not bleed into what is not; where alpha is
+/// not coverage everything counts alike.
 #[inline(always)]
-fn half<const COLOR: bool>(
+fn half<const COVERAGE: bool>(
     from: &[u8],
     w: usize,
     h: usize,
@@ -99,7 +101,7 @@ fn half<const COLOR: bool>(
                 }
             }
             let scale = 1.0 / alpha;
-            let color = |c: usize| encode(if COLOR && alpha > 0.0 { sum[c] * scale } else { plain[c] });
+            let color = |c: usize| encode(if COVERAGE && alpha > 0.0 { sum[c] * scale } else { plain[c] });
             out.extend_from_slice(&[color(0), color(1), color(2), (alpha + 0.5) as u8]);
         }
     }
@@ -112,10 +114,13 @@ mod tests {
 
     #[test]
     fn black_and_white_meet_in_linear_light() {
-        let levels = chain(2, 1, vec![0, 0, 0, 255, 255, 255, 255, 255], true);
+        let levels = chain(2, 1, vec![0, 0, 0, 255, 255, 255, 255, 255], Content::Color);
         // sRGB of one half is 187.5.
         assert_eq!(levels[1], [188, 188, 188, 255]);
-        assert_eq!(chain(2, 1, vec![0, 10, 0, 255, 255, 20, 255, 255], false)[1], [128, 15, 128, 255]);
+        assert_eq!(
+            chain(2, 1, vec![0, 10, 0, 255, 255, 20, 255, 255], Content::Numbers)[1],
+            [128, 15, 128, 255]
+        );
     }
 
     #[test]
@@ -126,13 +131,13 @@ mod tests {
         let (linear, codes) = (&*LINEAR_OF_SRGB8, &**CODES);
         let long =
             half::<true>(&picture, 64, 32, |c| linear[c as usize], |v| codes[(v * 65535.0 + 0.5) as usize]);
-        let off = half_srgb(&picture, 64, 32).iter().zip(&long).map(|(a, b)| a.abs_diff(*b)).max();
+        let off = half_srgb::<true>(&picture, 64, 32).iter().zip(&long).map(|(a, b)| a.abs_diff(*b)).max();
         assert!(off <= Some(1), "{off:?}");
     }
 
     #[test]
     fn what_is_invisible_does_not_bleed() {
-        let levels = chain(2, 1, vec![200, 100, 50, 255, 0, 255, 0, 0], true);
+        let levels = chain(2, 1, vec![200, 100, 50, 255, 0, 255, 0, 0], Content::Color);
         assert_eq!(levels[1], [200, 100, 50, 128]);
     }
 
@@ -140,10 +145,10 @@ mod tests {
     fn odd_sizes_keep_the_mean() {
         // Five texels to two: the middle one counts half in each.
         let row: Vec<u8> = [10, 20, 30, 40, 50].iter().flat_map(|&v| [v, v, v, 255]).collect();
-        let levels = chain(5, 1, row, false);
+        let levels = chain(5, 1, row, Content::Numbers);
         assert_eq!(levels.iter().map(|l| l.len() / 4).collect::<Vec<_>>(), [5, 2, 1]);
         assert_eq!((levels[1][0], levels[1][4], levels[2][0]), (18, 42, 30));
-        let flat = chain(7, 3, vec![77; 4 * 21], true);
+        let flat = chain(7, 3, vec![77; 4 * 21], Content::Color);
         assert!(flat.iter().flatten().all(|&v| v == 77));
     }
 }

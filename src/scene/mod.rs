@@ -9,7 +9,7 @@ mod texture;
 pub use camera::{Camera, CameraError, Projection};
 pub use light::{Light, LightKind};
 pub use material::{AlphaMode, Material, TextureRef};
-pub use texture::{Filter, Texture, TextureError, TextureId, WrapMode};
+pub use texture::{Content, Filter, Texture, TextureError, TextureId, WrapMode};
 
 use crate::mesh::Mesh;
 use glam::{Vec3, Vec4};

@@ -26,12 +26,23 @@ pub enum Filter {
     Trilinear,
 }
 
+/// What a texture's numbers are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Content {
+    /// RGB are sRGB codes and alpha is coverage: mip levels are means in linear light that count by alpha.
+    Color,
+    /// RGB are sRGB codes and alpha is a number of its own: means in linear light, alpha apart.
+    ColorAndNumber,
+    /// Four numbers, as in normal maps: plain means.
+    Numbers,
+}
+
 /// Decoded 8-bit RGBA with its mip chain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
     width: u32,
     height: u32,
-    srgb: bool,
+    content: Content,
     wrap: [WrapMode; 2],
     filter: Filter,
     levels: Vec<Vec<u8>>,
@@ -52,8 +63,7 @@ pub struct TextureError {
 }
 
 impl Texture {
-    /// Build from RGBA bytes, rows from the top. `srgb`: RGB are sRGB codes (alpha never is); mip levels are then averaged
-    /// in linear light. Colours count by their alpha in those means.
+    /// Build from RGBA bytes, rows from the top.
     ///
     /// # Errors
     /// [`TextureError`] where the bytes do not fit the size.
@@ -61,7 +71,7 @@ impl Texture {
         width: u32,
         height: u32,
         rgba: Vec<u8>,
-        srgb: bool,
+        content: Content,
         wrap: [WrapMode; 2],
         filter: Filter,
     ) -> Result<Self, TextureError> {
@@ -69,7 +79,8 @@ impl Texture {
         if expected == 0 || rgba.len() as u64 != expected {
             return Err(TextureError { width, height, expected, found: rgba.len() as u64 });
         }
-        Ok(Self { width, height, srgb, wrap, filter, levels: super::mips::chain(width, height, rgba, srgb) })
+        let levels = super::mips::chain(width, height, rgba, content);
+        Ok(Self { width, height, content, wrap, filter, levels })
     }
 
     /// Pixels a row of the finest level.
@@ -84,7 +95,7 @@ impl Texture {
 
     /// RGB are sRGB codes.
     pub fn srgb(&self) -> bool {
-        self.srgb
+        self.content != Content::Numbers
     }
 
     /// What lies outside, along u and v.

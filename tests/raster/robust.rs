@@ -2,7 +2,7 @@
 
 use super::*;
 use sinew::math::simd::Isa;
-use sinew::scene::{Filter, LightKind, TextureId, TextureRef, WrapMode};
+use sinew::scene::{Content, Filter, LightKind, TextureId, TextureRef, WrapMode};
 
 /// Everything at once: opaque, masked and transparent triangles of all sizes, textured, lit, cut by the near plane.
 fn jumble(seed: u64) -> Stage {
@@ -15,7 +15,8 @@ fn jumble(seed: u64) -> Stage {
     stage.meshes.clear();
     let bytes = (0..32 * 32 * 4).map(|_| rng.next() as u8).collect();
     stage.textures.push(
-        Texture::new(32, 32, bytes, true, [WrapMode::Repeat, WrapMode::Mirror], Filter::Trilinear).unwrap(),
+        Texture::new(32, 32, bytes, Content::Color, [WrapMode::Repeat, WrapMode::Mirror], Filter::Trilinear)
+            .unwrap(),
     );
     let map = TextureRef { texture: TextureId(0), uv_set: 0, transform: glam::Affine2::IDENTITY };
     let base = Material {

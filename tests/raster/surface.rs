@@ -2,7 +2,7 @@
 
 use super::*;
 use glam::Affine2;
-use sinew::scene::{Filter, TextureId, TextureRef, WrapMode};
+use sinew::scene::{Content, Filter, TextureId, TextureRef, WrapMode};
 
 fn textured(texture: Texture, uv_scale: f32, uv_shift: f32) -> Stage {
     let transform = Affine2::from_scale_angle_translation(Vec2::splat(uv_scale), 0.0, Vec2::splat(uv_shift));
@@ -19,7 +19,7 @@ fn noise(side: u32, seed: u64) -> Vec<u8> {
 }
 
 fn texture(side: u32, bytes: Vec<u8>, wrap: WrapMode, filter: Filter) -> Texture {
-    Texture::new(side, side, bytes, true, [wrap; 2], filter).unwrap()
+    Texture::new(side, side, bytes, Content::Color, [wrap; 2], filter).unwrap()
 }
 
 #[test]
@@ -64,7 +64,8 @@ fn smaller_pictures_show_coarser_levels() {
     let gray = |v: u8| [v, v, v, 255];
     let checker: Vec<u8> =
         (0..64 * 64).flat_map(|i| gray(if (i + i / 64) % 2 == 0 { 0 } else { 255 })).collect();
-    let t = Texture::new(64, 64, checker, false, [WrapMode::Repeat; 2], Filter::Trilinear).unwrap();
+    let t =
+        Texture::new(64, 64, checker, Content::Numbers, [WrapMode::Repeat; 2], Filter::Trilinear).unwrap();
     let stage = textured(t, 2f32.sqrt(), 0.0);
     let (picture, _) = stage.linear(64, 1);
     let mean = picture.pixels.iter().map(|p| p[0]).sum::<f32>() / 4096.0;
@@ -122,8 +123,15 @@ fn a_mask_leaves_what_reaches_the_cut_off() {
 fn a_normal_map_tilts_with_or_without_tangents() {
     // The map leans towards +u by 45°; with u to the right and light from the right at 45°, n·l = 1.
     let lean = (127.5f32 + 127.5 * 0.5f32.sqrt()).round() as u8;
-    let map = Texture::new(1, 1, vec![lean, 128, lean, 255], false, [WrapMode::Repeat; 2], Filter::Nearest)
-        .unwrap();
+    let map = Texture::new(
+        1,
+        1,
+        vec![lean, 128, lean, 255],
+        Content::Numbers,
+        [WrapMode::Repeat; 2],
+        Filter::Nearest,
+    )
+    .unwrap();
     let mut data = quad(1.0, 0.0);
     data.normals = vec![Vec3::Z; 4];
     let reference = TextureRef { texture: TextureId(0), uv_set: 0, transform: Affine2::IDENTITY };

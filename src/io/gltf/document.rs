@@ -30,6 +30,11 @@ pub(super) struct Document<'a> {
 }
 
 impl<'a> Document<'a> {
+    /// Bytes of all buffers, each file's once.
+    pub fn bytes(&self) -> u64 {
+        self.blobs.iter().map(|b| b.len() as u64).sum()
+    }
+
     /// Load the buffers: the binary chunk, embedded data, files beside the asset.
     pub fn new(mut root: Root, bin: Option<&'a [u8]>, base: Option<&Path>, w: &mut Warnings) -> Result<Self> {
         let mut files = Files::default();

@@ -7,7 +7,7 @@ use super::geometry::Geometry;
 use super::textures::{Slot, Textures};
 use super::warnings::Warnings;
 use crate::io::Options;
-use crate::scene::{AlphaMode, Material, Texture};
+use crate::scene::{AlphaMode, Content, Material, Texture};
 use ::gltf::json;
 use ::gltf::json::validation::Checked;
 use glam::{Vec3, Vec4};
@@ -94,10 +94,13 @@ fn one(m: &json::Material, name: String, textures: &mut Textures, w: &mut Warnin
     let mut out = Material {
         name,
         emissive: finite(Vec3::from_array(m.emissive_factor.0) * strength),
-        emissive_map: m.emissive_texture.as_ref().and_then(|t| textures.plain(Slot::of(t), true, w)),
-        normal_map: normal(m).and_then(|s| textures.plain(s, false, w)),
+        emissive_map: m
+            .emissive_texture
+            .as_ref()
+            .and_then(|t| textures.plain(Slot::of(t), Content::ColorAndNumber, w)),
+        normal_map: normal(m).and_then(|s| textures.plain(s, Content::Numbers, w)),
         normal_scale: m.normal_texture.as_ref().map_or(1.0, |t| t.scale),
-        occlusion_map: occlusion(m).and_then(|s| textures.plain(s, false, w)),
+        occlusion_map: occlusion(m).and_then(|s| textures.plain(s, Content::Numbers, w)),
         occlusion_strength: m.occlusion_texture.as_ref().map_or(1.0, |t| t.strength.0),
         alpha: match m.alpha_mode {
             Checked::Valid(json::material::AlphaMode::Mask) => AlphaMode::Mask(cutoff),
@@ -116,18 +119,20 @@ fn one(m: &json::Material, name: String, textures: &mut Textures, w: &mut Warnin
 fn reflect(m: &json::Material, out: &mut Material, textures: &mut Textures, w: &mut Warnings) {
     let (color, mut workflow) = factors(m);
     let (color_slot, second) = pair(m);
+    // On an opaque surface alpha means nothing, so it must not weigh colours.
+    let content = if out.alpha == AlphaMode::Opaque { Content::ColorAndNumber } else { Content::Color };
     let rgb = finite(color.truncate());
     if out.unlit {
         out.diffuse = rgb.extend(color.w);
         out.specular = Vec3::ZERO;
-        out.diffuse_map = color_slot.and_then(|s| textures.plain(s, true, w));
+        out.diffuse_map = color_slot.and_then(|s| textures.plain(s, content, w));
         return;
     }
 
     // Where reflectance varies, or a metal's varies with its colour, both maps are made pixel by pixel.
     let tinted = matches!(workflow, Workflow::Metallic { metallic, .. } if metallic > 0.0);
     if second.is_some() || (tinted && color_slot.is_some()) {
-        if let Some(baked) = textures.bake(color_slot, second, rgb, workflow, w) {
+        if let Some(baked) = textures.bake([color_slot, second], content, rgb, workflow, w) {
             out.diffuse = Vec3::ONE.extend(color.w);
             out.diffuse_map = baked.diffuse;
             out.specular = Vec3::ONE;
@@ -142,7 +147,7 @@ fn reflect(m: &json::Material, out: &mut Material, textures: &mut Textures, w: &
     }
     let look = workflow.phong(rgb, [255; 4]);
     out.diffuse = look.diffuse.extend(color.w);
-    out.diffuse_map = color_slot.and_then(|s| textures.plain(s, true, w));
+    out.diffuse_map = color_slot.and_then(|s| textures.plain(s, content, w));
     out.specular = look.specular;
     out.shininess = look.shininess;
 }

@@ -11,9 +11,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Longest side that is decoded, pixels.
 const SIDE: u32 = 1 << 14;
-/// Bytes that the decoded pictures of a file may take together, mip levels included: twelve of 2048×2048, three of
-/// 4096×4096. The undecoded bytes of their files may take as many, and so may what is made of the pictures besides.
+/// Bytes that the decoded pictures of a file may take together however small the file is, mip levels included: twelve of
+/// 2048×2048. What is made of the pictures besides may take as many.
 pub(super) const PIXEL_BYTES: u64 = 256 << 20;
+/// Decoded bytes that each undecoded one allows in addition: photographs as JPEG stay below, so that an asset with hundreds
+/// of honest pictures is read, and a small file cannot ask for much.
+const EXPANSION: u64 = 64;
+/// Bytes of pictures in files beside the asset.
+const ENCODED_BYTES: u64 = 1 << 30;
 
 /// Bytes of RGBA with mip levels, for sides up to [`SIDE`].
 pub(super) fn with_mips(width: usize, height: usize) -> u64 {
@@ -37,6 +42,8 @@ impl Picture {
 pub(super) struct Pictures {
     /// The pictures.
     pub list: Vec<Picture>,
+    /// Bytes that may be made of them besides.
+    pub allowance: u64,
     of: Vec<Option<usize>>,
 }
 
@@ -58,6 +65,10 @@ enum Key<'a> {
 struct Budget {
     encoded: u64,
     pixels: u64,
+    /// Bytes of buffers that have not allowed any decoded ones yet: views may overlap, but each byte counts once.
+    buffers: u64,
+    /// What undecoded bytes have allowed so far.
+    allowed: u64,
 }
 
 type Job<'a> = Result<Cow<'a, [u8]>, String>;
@@ -65,7 +76,7 @@ type Job<'a> = Result<Cow<'a, [u8]>, String>;
 /// Decode the pictures that `wanted` names. What cannot be read is plain white and a warning.
 pub(super) fn load(doc: &Document, base: Option<&Path>, wanted: &[bool], w: &mut Warnings) -> Pictures {
     // Read the bytes and check the sizes in order, so that the outcome does not depend on threads.
-    let mut budget = Budget { encoded: PIXEL_BYTES, pixels: PIXEL_BYTES };
+    let mut budget = Budget { encoded: ENCODED_BYTES, pixels: PIXEL_BYTES, buffers: doc.bytes(), allowed: 0 };
     let mut known = BTreeMap::new();
     let (mut jobs, mut images): (Vec<Job>, Vec<usize>) = Default::default();
     let mut of = vec![None; wanted.len()];
@@ -96,7 +107,7 @@ pub(super) fn load(doc: &Document, base: Option<&Path>, wanted: &[bool], w: &mut
             Picture::white()
         }));
     }
-    Pictures { list, of }
+    Pictures { list, allowance: PIXEL_BYTES + budget.allowed, of }
 }
 
 fn key<'a>(doc: &'a Document, base: Option<&Path>, i: usize) -> Result<Key<'a>, String> {
@@ -119,13 +130,22 @@ impl Budget {
                     return Err(format!("has {size} bytes, too many; {}", limit()));
                 }
                 self.encoded -= size;
+                self.allow(size);
                 source.read(&place).map(Cow::Owned).map_err(|e| e.to_string())
             }
             Key::View(v) => {
                 let (bytes, _) = doc.view(*v, &place).map_err(|e| e.to_string())?;
+                let fresh = self.buffers.min(bytes.len() as u64);
+                self.buffers -= fresh;
+                self.allow(fresh);
                 Ok(Cow::Borrowed(bytes))
             }
         }
+    }
+
+    fn allow(&mut self, undecoded: u64) {
+        self.pixels += EXPANSION * undecoded;
+        self.allowed += EXPANSION * undecoded;
     }
 
     /// Let a picture pass if there is room for what it decodes to.
@@ -149,7 +169,10 @@ impl Budget {
 }
 
 fn limit() -> String {
-    format!("the pictures of a file may take {} MiB together", PIXEL_BYTES >> 20)
+    format!(
+        "the pictures of a file may take {} MiB and {EXPANSION} times its bytes together",
+        PIXEL_BYTES >> 20
+    )
 }
 
 type Decoded = Option<Result<Picture, String>>;

@@ -2,10 +2,10 @@
 
 use super::bake::{self, Grid, Size, Workflow};
 use super::document::Document;
-use super::pictures::{self, PIXEL_BYTES, Pictures, with_mips};
+use super::pictures::{self, Pictures, with_mips};
 use super::warnings::Warnings;
 use crate::io::Options;
-use crate::scene::{Filter, Texture, TextureId, TextureRef, WrapMode};
+use crate::scene::{Content, Filter, Texture, TextureId, TextureRef, WrapMode};
 use ::gltf::json::texture::{Info, MagFilter, MinFilter, Sampler, WrappingMode};
 use ::gltf::json::validation::Checked;
 use glam::{Affine2, Vec2, Vec3};
@@ -67,7 +67,7 @@ pub(super) struct Baked {
 type Sampling = [u8; 3];
 
 /// All that a baked pair follows from: pictures, sampling, whether they lie alike, factors.
-type Inputs = ([Option<usize>; 2], [Sampling; 2], bool, Vec<u32>);
+type Inputs = ([Option<usize>; 2], [Sampling; 2], bool, Content, Vec<u32>);
 
 /// Pictures of the file, and the textures made of them so far.
 pub(super) struct Textures<'a> {
@@ -76,7 +76,7 @@ pub(super) struct Textures<'a> {
     /// The texture that holds a picture's pixels now.
     holder: Vec<Option<TextureId>>,
     made: Vec<Texture>,
-    plain: BTreeMap<(usize, Sampling, bool), TextureId>,
+    plain: BTreeMap<(usize, Sampling, Content), TextureId>,
     baked: BTreeMap<Inputs, [TextureId; 2]>,
     /// Bytes that may still be made of the pictures.
     left: u64,
@@ -108,7 +108,8 @@ impl<'a> Textures<'a> {
         let pictures = pictures::load(doc, base, &wanted, w);
         let holder = vec![None; pictures.list.len()];
         let (made, plain, baked) = Default::default();
-        Self { doc, pictures, holder, made, plain, baked, left: PIXEL_BYTES, skip: false }
+        let left = pictures.allowance;
+        Self { doc, pictures, holder, made, plain, baked, left, skip: false }
     }
 
     /// Leave the materials to come without maps, or no longer.
@@ -117,10 +118,10 @@ impl<'a> Textures<'a> {
     }
 
     /// A texture as the file has it; `None` where it is missing or pictures are left out.
-    pub fn plain(&mut self, slot: Slot, srgb: bool, w: &mut Warnings) -> Option<TextureRef> {
+    pub fn plain(&mut self, slot: Slot, content: Content, w: &mut Warnings) -> Option<TextureRef> {
         let picture = self.picture(slot)?;
         let (wrap, filter) = self.sampling(slot);
-        let key = (picture, code(wrap, filter), srgb);
+        let key = (picture, code(wrap, filter), content);
         let id = match self.plain.get(&key) {
             Some(id) => *id,
             None => {
@@ -133,7 +134,7 @@ impl<'a> Textures<'a> {
                         self.pixels(picture).to_vec()
                     }
                 };
-                let id = self.push((width, height), rgba, srgb, slot)?;
+                let id = self.push((width, height), rgba, content, slot)?;
                 self.holder[picture].get_or_insert(id);
                 self.plain.insert(key, id);
                 id
@@ -148,8 +149,8 @@ impl<'a> Textures<'a> {
     /// same inputs share the maps. `None` without pictures, or where there is no room for more maps.
     pub fn bake(
         &mut self,
-        color: Option<Slot>,
-        second: Option<Slot>,
+        [color, second]: [Option<Slot>; 2],
+        content: Content,
         factor: Vec3,
         workflow: Workflow,
         w: &mut Warnings,
@@ -168,7 +169,7 @@ impl<'a> Textures<'a> {
         let samplings = [slot_a, slot_b].map(|s| self.sampling(s));
         let codes = samplings.map(|(wrap, filter)| code(wrap, filter));
         let pictures = [a.map(|a| a.1), b.map(|b| b.1)];
-        let key = (pictures, codes, alike, workflow.bits(factor));
+        let key = (pictures, codes, alike, content, workflow.bits(factor));
         let [diffuse, specular] = match self.baked.get(&key) {
             Some(ids) => *ids,
             None => {
@@ -181,8 +182,10 @@ impl<'a> Textures<'a> {
                     Grid { size: own[k], rgba, wrap: samplings[k].0, srgb: srgb[k] }
                 };
                 let [diffuse, specular] = bake::bake(&grid(0), &grid(1), alike, factor, workflow);
-                let diffuse = self.push(sizes[0], diffuse, true, slot_a)?;
-                let ids = [diffuse, self.push(sizes[1], specular, true, slot_b)?];
+                let diffuse = self.push(sizes[0], diffuse, content, slot_a)?;
+                // The specular map's alpha is an exponent.
+                let specular = self.push(sizes[1], specular, Content::ColorAndNumber, slot_b)?;
+                let ids = [diffuse, specular];
                 self.baked.insert(key, ids);
                 ids
             }
@@ -193,7 +196,7 @@ impl<'a> Textures<'a> {
     /// Take bytes out of what may still be made.
     fn afford(&mut self, bytes: u64, w: &mut Warnings) -> Option<()> {
         let Some(left) = self.left.checked_sub(bytes) else {
-            let limit = PIXEL_BYTES >> 20;
+            let limit = self.pictures.allowance >> 20;
             w.push("materials", format!("maps made for them would take more than {limit} MiB; left out"));
             return None;
         };
@@ -222,9 +225,9 @@ impl<'a> Textures<'a> {
         sampling(sampler)
     }
 
-    fn push(&mut self, size: Size, rgba: Vec<u8>, srgb: bool, slot: Slot) -> Option<TextureId> {
+    fn push(&mut self, size: Size, rgba: Vec<u8>, content: Content, slot: Slot) -> Option<TextureId> {
         let (wrap, filter) = self.sampling(slot);
-        let texture = Texture::new(size.0 as u32, size.1 as u32, rgba, srgb, wrap, filter).ok()?;
+        let texture = Texture::new(size.0 as u32, size.1 as u32, rgba, content, wrap, filter).ok()?;
         self.made.push(texture);
         Some(TextureId(self.made.len() as u32 - 1))
     }

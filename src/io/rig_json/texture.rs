@@ -2,7 +2,7 @@
 
 use super::{Fetch, RigError, inside_project};
 use crate::io::Warning;
-use crate::scene::{Texture, TextureId};
+use crate::scene::{Content, Texture, TextureId};
 
 /// Bytes that the pictures of one rig may take together, decoded to four bytes a pixel and without their mip levels: 256 MiB.
 pub const MAX_TEXTURE_BYTES: u64 = 256 << 20;
@@ -70,7 +70,7 @@ pub(super) fn decode(file: &str, bytes: &[u8], left: &mut u64) -> Result<Option<
     reader.limits(limits);
     let picture = reader.decode().map_err(|e| error(e.to_string()))?.into_rgba8();
     let (width, height) = picture.dimensions();
-    Texture::new(width, height, picture.into_raw(), true, [WrapMode::Repeat; 2], Filter::Trilinear)
+    Texture::new(width, height, picture.into_raw(), Content::Color, [WrapMode::Repeat; 2], Filter::Trilinear)
         .map(Some)
         .map_err(|e| error(e.to_string()))
 }
