@@ -2,7 +2,7 @@
 
 use super::{Fetch, RigError, inside_project};
 use crate::io::Warning;
-use crate::scene::{Content, Texture, TextureId};
+use crate::scene::{Texture, TextureId};
 
 /// Bytes that the pictures of one rig may take together, decoded to four bytes a pixel and without their mip levels: 256 MiB.
 pub const MAX_TEXTURE_BYTES: u64 = 256 << 20;
@@ -50,7 +50,7 @@ pub(super) fn decode(_: &str, _: &[u8], _: &mut u64) -> Result<Option<Texture>, 
 
 #[cfg(feature = "pictures")]
 pub(super) fn decode(file: &str, bytes: &[u8], left: &mut u64) -> Result<Option<Texture>, RigError> {
-    use crate::scene::{Filter, WrapMode};
+    use crate::scene::{Content, Filter, WrapMode};
     let error = |message: String| RigError::Texture { file: file.into(), message };
     let open = || image::ImageReader::with_format(std::io::Cursor::new(bytes), image::ImageFormat::Png);
 
