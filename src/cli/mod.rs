@@ -1,7 +1,6 @@
 //! The command line: parse, call the library, print, choose an exit code. No algorithm lives here.
 
 mod eval;
-mod film;
 mod info;
 mod render;
 mod say;

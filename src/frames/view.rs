@@ -19,6 +19,13 @@ pub enum View {
     Mounted(usize),
 }
 
+impl Default for View {
+    /// Half from the front, a little from above.
+    fn default() -> Self {
+        Self::Orbit { yaw: 30f32.to_radians(), pitch: 12f32.to_radians(), fov_y: 30f32.to_radians() }
+    }
+}
+
 /// The asset has no such camera.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("there is no camera {camera}; the asset has {count}")]
