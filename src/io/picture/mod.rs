@@ -23,6 +23,7 @@ mod nearest;
 mod palette;
 mod png;
 mod target;
+mod unnamed;
 
 pub use apng::ApngWriter;
 pub use atomic::{AtomicFile, Folder, cleanup_temporaries};
