@@ -1,6 +1,7 @@
 //! `sinew render`: what is to be drawn, from where, and into which files. One file a group of options.
 
 mod batch;
+mod bone;
 mod camera;
 mod film;
 mod look;
@@ -26,6 +27,8 @@ Examples:
   sinew render fox.glb -o run.####.png --clip Run --fps 30 --background transparent
   sinew render fox.glb -o part.%04d.png --frames 1-48x2,60
   sinew render fox.glb -o side.apng --camera yaw=90,pitch=5,fov=20
+  sinew render fox.glb -o icon.png --camera isometric --background transparent
+  sinew render rigs/fox.json -o round.gif --turntable
   sinew render fox.glb --list
 
 Frames are numbered from 1; frame 1 shows 0 s, or the clip's first key if that is earlier. The camera orbits the character and stands where all of it is
@@ -68,7 +71,12 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     keep_inputs(args, &target)?;
     let clip = args.time.clip(&import)?;
     let range = clip.map_or(Range::default(), |c| asset.character.clips()[c].playback());
-    let frames = args.time.frames(&args.input, range, matches!(target, Target::Still(_)))?;
+    let alone = matches!(target, Target::Still(_));
+    let lap = args.camera.turntable;
+    let frames = args.time.frames(&args.input, range, alone, lap)?;
+    if let Some(note) = lap.and_then(|lap| args.time.seam(range, lap)) {
+        say.note(&note);
+    }
     target.check_frames(frames.len()).map_err(|e| usage(&e))?;
 
     let character = &asset.character;
@@ -80,8 +88,9 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     let settings = Settings { threads: if frames.len() == 1 { threads } else { 1 }, ..settings };
     let desc = ShotDesc {
         clip,
-        wrap: args.time.wrap,
+        wrap: args.time.wrap(lap),
         view: args.camera.view(asset)?,
+        framing: args.camera.framing(asset)?,
         look: args.look.look(asset)?,
         settings,
     };
