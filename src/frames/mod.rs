@@ -1,5 +1,6 @@
 //! Times to pictures: the one place where animation meets rendering.
 
+mod channels;
 mod fit;
 mod look;
 mod ordered;
