@@ -1,5 +1,6 @@
 //! Scenes to pictures.
 
+pub mod channel;
 mod material;
 mod sample;
 mod shade;
