@@ -3,6 +3,7 @@
 use crate::asset::Asset;
 use crate::character::Scratch;
 use crate::fk::{self, Posed};
+use crate::image::Image;
 use crate::pose::Pose;
 use crate::render::raster::Rasterizer;
 use crate::skin::Deformed;
@@ -16,6 +17,9 @@ pub struct Worker {
     pub(super) scratch: Scratch,
     pub(super) deformed: Vec<Deformed>,
     pub(super) rasterizer: Rasterizer,
+    /// Pictures in linear light, where one is put together from layers.
+    pub(super) canvas: Image,
+    pub(super) layer: Image,
 }
 
 impl Worker {

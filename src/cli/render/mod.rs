@@ -113,6 +113,7 @@ fn draw(args: &Args, task: &Task, plan: &Plan, say: &Say) -> Result<Written, Fai
         view: args.camera.view(asset)?,
         framing: args.camera.framing(asset)?,
         look: args.look.look(asset)?,
+        overlays: args.overlay.overlays(asset, args.time.fps)?,
         settings,
     };
     let shot = Shot::new(asset, desc).map_err(|e| Failure::Usage(e.to_string()))?;
