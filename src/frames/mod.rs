@@ -6,7 +6,7 @@ mod ordered;
 mod view;
 mod worker;
 
-pub use look::Look;
+pub use look::{Look, Shading};
 pub use ordered::{Stop, in_order};
 pub use view::{Framing, View, ViewError};
 pub use worker::Worker;
@@ -101,8 +101,7 @@ impl<'a> Shot<'a> {
     /// # Panics
     /// If the asset has no such clip.
     pub fn new(asset: &'a Asset, desc: ShotDesc) -> Result<Self, ViewError> {
-        let mut materials = asset.materials.clone();
-        materials.push(Material::default());
+        let materials = look::materials(asset, &desc.look);
         let settings = &desc.settings;
         let aspect = settings.width as f32 / settings.height.max(1) as f32;
         let range = desc.clip.map(|c| asset.character.clips()[c].playback()).unwrap_or_default();
@@ -170,19 +169,21 @@ impl<'a> Shot<'a> {
             Object {
                 mesh,
                 positions: &d.positions,
-                normals: &d.normals,
+                normals: if self.desc.look.shading == Shading::Facets { &[] } else { &d.normals },
                 tangents: &d.tangents,
                 material,
                 mirrored: d.mirrored,
             }
         };
         let camera = self.camera(moment, posed);
-        let (ambient, lights) = look::lights(&self.asset.lights, posed, self.center, &camera);
+        let look = &self.desc.look;
+        let lit = look::lights(look, &self.asset.lights, posed, self.center, &camera);
         Scene {
             camera,
-            ambient,
-            lights,
-            background: self.desc.look.background,
+            ambient: lit.ambient,
+            lights: lit.lights,
+            style: lit.style,
+            background: look.background,
             objects: character.instances().iter().zip(deformed).map(object).collect(),
             materials: &self.materials,
             textures: &self.asset.textures,

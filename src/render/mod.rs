@@ -3,6 +3,7 @@
 mod material;
 mod sample;
 mod shade;
+mod styled;
 
 // A loop that counts lanes is what becomes one vector instruction; iterators do not always.
 #[allow(clippy::needless_range_loop)]

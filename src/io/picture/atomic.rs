@@ -213,11 +213,7 @@ fn prepare_folder(path: &Path, parent: &Path, folder: Folder) -> Result<(), Erro
 }
 
 /// A new temporary in `folder`, on the list before anybody can interrupt.
-fn open_beside(
-    path: &Path,
-    folder: &Path,
-    permissions: Option<fs::Permissions>,
-) -> Result<Temporary, Error> {
+fn open_beside(path: &Path, folder: &Path, permissions: Option<fs::Permissions>) -> Result<Temporary, Error> {
     let failed = |source| Error::Io { path: path.to_owned(), action: "create the file", source };
     let mut builder = tempfile::Builder::new();
     builder.prefix(".sinew-").suffix(".tmp");
