@@ -21,6 +21,7 @@ use crate::scene::{Camera, Material, Object, Scene};
 use crate::skin::Deformed;
 use crate::time::{self, Range, Wrap};
 use glam::{Affine3A, DVec3};
+use std::time::{Duration, Instant};
 
 /// What is filmed, from where, and how it looks.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,7 +81,7 @@ pub struct Shot<'a> {
 }
 
 /// What a frame cost.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct FrameStats {
     /// Bones evaluated.
     pub bones: usize,
@@ -88,6 +89,30 @@ pub struct FrameStats {
     pub vertices: usize,
     /// What the rasterizer counted.
     pub raster: Stats,
+    /// Where the time went.
+    pub times: Times,
+}
+
+/// Time a stage, by the wall's clock.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Times {
+    /// Sampling the clip and forward kinematics.
+    pub pose: Duration,
+    /// Morphing and skinning.
+    pub deform: Duration,
+    /// Scene to pixels.
+    pub draw: Duration,
+}
+
+impl std::ops::AddAssign for FrameStats {
+    fn add_assign(&mut self, o: Self) {
+        self.bones += o.bones;
+        self.vertices += o.vertices;
+        self.raster += o.raster;
+        self.times.pose += o.times.pose;
+        self.times.deform += o.times.deform;
+        self.times.draw += o.times.draw;
+    }
 }
 
 impl<'a> Shot<'a> {
@@ -152,12 +177,16 @@ impl<'a> Shot<'a> {
         worker: &mut Worker,
         draw: impl FnOnce(&Scene, &mut crate::render::raster::Rasterizer) -> Stats,
     ) -> FrameStats {
+        let start = Instant::now();
         worker.evaluate(self.asset, self.desc.clip, time::wrap(moment.time, self.range, self.desc.wrap));
+        let posed = Instant::now();
         worker.deform(self.asset, self.center);
+        let deformed = Instant::now();
         let scene = self.scene(moment, &worker.posed, &worker.deformed);
         let raster = draw(&scene, &mut worker.rasterizer);
         let vertices = worker.deformed.iter().map(|d| d.positions.len()).sum();
-        FrameStats { bones: worker.posed.len(), vertices, raster }
+        let times = Times { pose: posed - start, deform: deformed - posed, draw: deformed.elapsed() };
+        FrameStats { bones: worker.posed.len(), vertices, raster, times }
     }
 
     fn scene<'s>(&'s self, moment: Moment, posed: &Posed, deformed: &'s [Deformed]) -> Scene<'s> {

@@ -9,15 +9,16 @@ mod overlay;
 mod sheet;
 mod time;
 
-use super::{Failure, load_posed, print, say, say::Say};
-use film::Job;
+use super::{Failure, print, say, say::Say};
+use film::{Job, Written};
 use sinew::asset::Asset;
 use sinew::frames::{Shot, ShotDesc};
-use sinew::io::Options;
+use sinew::io::Import;
 use sinew::io::picture::Target;
 use sinew::render::Settings;
 use sinew::time::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use time::Frame;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -26,6 +27,8 @@ Examples:
   sinew render fox.glb -o run.####.png --clip Run --fps 30 --background transparent
   sinew render fox.glb -o part.%04d.png --frames 1-48x2,60
   sinew render fox.glb -o side.apng --camera yaw=90,pitch=5,fov=20
+  sinew render *.glb --all-clips -o thumbs/{name}-{clip}.gif
+  sinew render fox.glb -o farm.####.png --shard 2/4 --manifest part2.json
   sinew render fox.glb --list
 
 Frames are numbered from 1; frame 1 shows 0 s, or the clip's first key if that is earlier. The camera orbits the character and stands where all of it is
@@ -34,8 +37,9 @@ seen over the whole clip, unless --camera names one of the asset's. An existing 
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// A glTF file (.gltf, .glb) or a rig (.json).
-    input: PathBuf,
+    /// glTF files (.gltf, .glb) or rigs (.json).
+    #[arg(required = true, value_name = "INPUT")]
+    inputs: Vec<PathBuf>,
     /// Show the clips and cameras of the input and stop.
     #[arg(long)]
     list: bool,
@@ -56,59 +60,64 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
-    let usage = |e: &dyn std::fmt::Display| Failure::Usage(e.to_string());
-    let target = args.output.target()?;
+    batch::run(args, say)
+}
+
+/// One output: an asset, one of its clips or rest, and where the pictures go.
+struct Task<'a> {
+    input: &'a Path,
+    import: &'a Import,
+    clip: Option<usize>,
+    target: &'a Target,
+}
+
+/// Which pictures an output consists of.
+struct Plan {
+    frames: Vec<Frame>,
+    size: [usize; 2],
+}
+
+fn plan(args: &Args, task: &Task) -> Result<Plan, Failure> {
+    let clips = task.import.asset.character.clips();
+    let range = task.clip.map_or(Range::default(), |c| clips[c].playback());
+    let frames = args.time.frames(task.input, range, matches!(task.target, Target::Still(_)))?;
+    task.target.check_frames(frames.len()).map_err(|e| Failure::Usage(e.to_string()))?;
     let settings = args.output.settings()?;
-    let threads = args.output.threads();
+    Ok(Plan { frames, size: [settings.width, settings.height] })
+}
 
-    let options = Options { textures: target.is_some() };
-    let import = load_posed(&args.input, args.time.poses.as_ref(), options, say)?;
-    let asset = &import.asset;
-    let Some(target) = target.filter(|_| !args.list) else { return list(asset) };
-    keep_inputs(args, &target)?;
-    let clip = args.time.clip(&import)?;
-    let range = clip.map_or(Range::default(), |c| asset.character.clips()[c].playback());
-    let frames = args.time.frames(&args.input, range, matches!(target, Target::Still(_)))?;
-    target.check_frames(frames.len()).map_err(|e| usage(&e))?;
-
+/// Draw the frames of a plan and write them.
+fn draw(args: &Args, task: &Task, plan: &Plan, say: &Say) -> Result<Written, Failure> {
+    let asset = &task.import.asset;
     let character = &asset.character;
     if character.instances().iter().all(|i| character.mesh(i).triangles.is_empty()) {
-        say.warn(&format!("{}: there are no triangles; the picture will be empty", args.input.display()));
+        say.warn(&format!("{}: there are no triangles; the picture will be empty", task.input.display()));
     }
 
     // One picture is drawn by all threads, many by one thread each.
-    let settings = Settings { threads: if frames.len() == 1 { threads } else { 1 }, ..settings };
+    let threads = args.output.threads();
+    let alone = plan.frames.len() == 1;
+    let settings = Settings { threads: if alone { threads } else { 1 }, ..args.output.settings()? };
     let desc = ShotDesc {
-        clip,
+        clip: task.clip,
         wrap: args.time.wrap,
         view: args.camera.view(asset)?,
         look: args.look.look(asset)?,
         settings,
     };
-    let shot = Shot::new(asset, desc).map_err(|e| usage(&e))?;
+    let shot = Shot::new(asset, desc).map_err(|e| Failure::Usage(e.to_string()))?;
     let job = Job {
         shot: &shot,
-        frames: &frames,
+        frames: &plan.frames,
         rate: args.time.fps,
         transparent: args.look.transparent(),
-        target: &target,
+        target: task.target,
         level: args.output.png,
         threads,
         force: args.output.force,
+        hash: args.batch.manifest.is_some(),
     };
     film::write(&job, say)
-}
-
-/// Refuse to write over what is being read, `--force` or not.
-fn keep_inputs(args: &Args, target: &Target) -> Result<(), Failure> {
-    let Ok(output) = target.path_of(1).canonicalize() else { return Ok(()) };
-    for input in [Some(&args.input), args.time.poses.as_ref()].into_iter().flatten() {
-        if input.canonicalize().is_ok_and(|i| i == output) {
-            let message = format!("-o {}: this is the input; choose another name", input.display());
-            return Err(Failure::Usage(message));
-        }
-    }
-    Ok(())
 }
 
 fn list(asset: &Asset) -> Result<(), Failure> {

@@ -23,6 +23,7 @@ mod nearest;
 mod palette;
 mod png;
 mod target;
+mod template;
 mod unnamed;
 
 pub use apng::ApngWriter;
@@ -34,6 +35,7 @@ pub use judge::{DitherScore, choose_dither};
 pub use palette::Palette;
 pub use png::{PngLevel, encode_png};
 pub use target::{Format, Pattern, Target, TargetError};
+pub use template::{Fields, Template, TemplateError};
 
 use crate::image::Rgba8;
 use std::path::PathBuf;

@@ -69,8 +69,8 @@ pub struct Stats {
     pub shaded: u64,
 }
 
-impl Stats {
-    fn add(&mut self, o: &Self) {
+impl std::ops::AddAssign for Stats {
+    fn add_assign(&mut self, o: Self) {
         self.triangles += o.triangles;
         self.vertices += o.vertices;
         self.skipped += o.skipped;
@@ -187,8 +187,8 @@ impl Rasterizer {
                 simd::run(isa, tile::Row { frame: &frame, bins, row, scratch, target: &mut target });
             }
         });
-        bins.iter().for_each(|b| stats.add(&b.stats));
-        self.tiles[..threads].iter().for_each(|t| stats.add(&t.stats));
+        bins.iter().for_each(|b| stats += b.stats);
+        self.tiles[..threads].iter().for_each(|t| stats += t.stats);
         stats
     }
 }
