@@ -10,7 +10,7 @@ mod view;
 mod worker;
 
 pub use framing::{Framing, Turns};
-pub use look::Look;
+pub use look::{Look, Shading};
 pub use ordered::{Stop, in_order};
 pub use view::{FramingDesc, Pivot, View, ViewError};
 pub use worker::Worker;
@@ -136,8 +136,7 @@ impl<'a> Shot<'a> {
     /// # Panics
     /// If the asset has no such clip.
     pub fn new(asset: &'a Asset, desc: ShotDesc) -> Result<Self, ViewError> {
-        let mut materials = asset.materials.clone();
-        materials.push(Material::default());
+        let materials = look::materials(asset, &desc.look);
         let settings = &desc.settings;
         let aspect = settings.width as f32 / settings.height.max(1) as f32;
         let range = desc.clip.map(|c| asset.character.clips()[c].playback()).unwrap_or_default();
@@ -199,19 +198,21 @@ impl<'a> Shot<'a> {
             Object {
                 mesh,
                 positions: &d.positions,
-                normals: &d.normals,
+                normals: if self.desc.look.shading == Shading::Facets { &[] } else { &d.normals },
                 tangents: &d.tangents,
                 material,
                 mirrored: d.mirrored,
             }
         };
         let camera = self.stand.camera(moment, posed, deformed);
-        let (ambient, lights) = look::lights(&self.asset.lights, posed, self.center, &camera);
+        let look = &self.desc.look;
+        let lit = look::lights(look, &self.asset.lights, posed, self.center, &camera);
         Scene {
             camera,
-            ambient,
-            lights,
-            background: self.desc.look.background,
+            ambient: lit.ambient,
+            lights: lit.lights,
+            style: lit.style,
+            background: look.background,
             objects: character.instances().iter().zip(deformed).map(object).collect(),
             materials: &self.materials,
             textures: &self.asset.textures,
