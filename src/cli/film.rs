@@ -1,14 +1,14 @@
 //! Frames into files: drawn and encoded by workers, written in order.
 
 use super::{Failure, say::Say};
-use sinew::frames::{FrameStats, Shot, Stop, Worker, in_order};
+use sinew::frames::{FrameStats, Shot, Stop, Worker, in_order_pairs};
 use sinew::image::Rgba8;
 use sinew::io::picture::{
-    self, ApngWriter, AtomicFile, Film, Folder, Format, GifWriter, Mapper, Palette, PngLevel, Target,
-    choose_dither, encode_png,
+    self, AtomicFile, Coding, Film, FilmWriter, Folder, Format, FrameEncoder, Output, Palette, PngLevel,
+    Target, choose_dither, encode_png, encode_webp,
 };
 use sinew::time::Rate;
-use std::path::Path;
+use std::io::Write;
 use std::time::Instant;
 
 /// Frames that a palette is made from.
@@ -36,10 +36,13 @@ pub fn write(job: &Job, say: &Say) -> Result<(), Failure> {
     });
     refuse_existing(job)?;
     let start = Instant::now();
-    let total = match job.target {
-        Target::Still(_) | Target::Sequence(_) => stills(job, say)?,
-        Target::Film(path, Format::Apng) => apng(job, path, say)?,
-        Target::Film(path, _) => gif(job, path, say)?,
+    let drawn = if job.target.is_film(job.moments.len()) { film(job, say) } else { stills(job, say) };
+    let total = match drawn {
+        // A reader that has seen enough (`| head`) is no failure.
+        Err(Fault::Write(e)) if e.is_closed_pipe() => return Ok(()),
+        Err(Fault::Write(e)) => return Err(Failure::Run(e.to_string())),
+        Err(Fault::Stopped) => return Err(Failure::Run("drawing stopped".into())),
+        Ok(total) => total,
     };
     let n = job.moments.len();
     let seconds = start.elapsed().as_secs_f64();
@@ -50,18 +53,26 @@ pub fn write(job: &Job, say: &Say) -> Result<(), Failure> {
         total.vertices,
         total.raster
     ));
-    say.note(&match job.target {
-        Target::Sequence(_) if n > 1 => {
-            let path = |i: usize| job.target.path_of(job.moments[i].0).display().to_string();
-            format!("wrote {n} frames, {} … {}", path(0), path(n - 1))
+    say.note(&match [0, n - 1].map(|i| job.target.path_of(job.moments[i].0)) {
+        [None, _] => return Ok(()),
+        [Some(first), Some(last)] if first != last => {
+            format!("wrote {n} frames, {} … {}", first.display(), last.display())
         }
-        _ => format!("wrote {}", job.target.path_of(job.moments[0].0).display()),
+        [Some(path), _] => format!("wrote {}", path.display()),
     });
     Ok(())
 }
 
-fn failed(e: picture::Error) -> Failure {
-    Failure::Run(e.to_string())
+/// Why frames were not written.
+enum Fault {
+    Write(picture::Error),
+    Stopped,
+}
+
+impl From<picture::Error> for Fault {
+    fn from(e: picture::Error) -> Self {
+        Self::Write(e)
+    }
 }
 
 /// Say so before anything is drawn.
@@ -70,7 +81,7 @@ fn refuse_existing(job: &Job) -> Result<(), Failure> {
         return Ok(());
     }
     for (number, _) in job.moments {
-        let path = job.target.path_of(*number);
+        let Some(path) = job.target.path_of(*number) else { continue };
         if path.exists() {
             let message = format!("{}: the file exists; --force overwrites it", path.display());
             return Err(Failure::Run(message));
@@ -79,23 +90,27 @@ fn refuse_existing(job: &Job) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Draw all moments in parallel, finish each on its worker, and hand the results on in order.
+/// Draw moments in parallel, encode each beside the one before on a worker, and hand the results on in order.
 fn draw<S, T: Send>(
     job: &Job,
     moments: &[(i64, f64)],
     state: impl Fn() -> S + Sync,
-    finish: impl Fn(&mut S, Rgba8) -> T + Sync,
+    encode: impl Fn(&mut S, Option<&Rgba8>, &Rgba8) -> T + Sync,
     mut receive: impl FnMut(usize, T) -> Result<(), picture::Error>,
-) -> Result<FrameStats, Failure> {
+) -> Result<FrameStats, Fault> {
     let mut fault = None;
     let mut last = FrameStats::default();
     let start = || (Worker::default(), state());
-    let one = |(worker, s): &mut (Worker, S), i: usize| {
+    let first = |(worker, _): &mut (Worker, S), i: usize| {
         let mut out = Rgba8::default();
         let stats = job.shot.draw(moments[i].1, worker, &mut out);
-        (stats, finish(s, out))
+        (out, stats)
     };
-    let done = in_order(moments.len(), job.threads, start, one, |i, (stats, result)| {
+    let second =
+        |(_, s): &mut (Worker, S), before: Option<&(Rgba8, FrameStats)>, now: &(Rgba8, FrameStats)| {
+            (encode(s, before.map(|b| &b.0), &now.0), now.1)
+        };
+    let done = in_order_pairs(moments.len(), job.threads, start, first, second, |i, (result, stats)| {
         last = stats;
         receive(i, result).map_err(|e| {
             fault = Some(e);
@@ -104,22 +119,33 @@ fn draw<S, T: Send>(
     });
     match (done, fault) {
         (Ok(()), _) => Ok(last),
-        (_, Some(e)) => Err(failed(e)),
-        (Err(Stop), None) => Err(Failure::Run("drawing stopped".into())),
+        (_, Some(e)) => Err(Fault::Write(e)),
+        (Err(Stop), None) => Err(Fault::Stopped),
     }
 }
 
-fn stills(job: &Job, say: &Say) -> Result<FrameStats, Failure> {
-    let folder = if matches!(job.target, Target::Sequence(_)) { Folder::Create } else { Folder::MustExist };
+/// A picture a frame, each into a file of its own or one after the other to standard output.
+fn stills(job: &Job, say: &Say) -> Result<FrameStats, Fault> {
+    let folder = if matches!(job.target, Target::Sequence(..)) { Folder::Create } else { Folder::MustExist };
     let bar = say.progress(job.moments.len());
+    let encode = |picture: &Rgba8| match job.target.format() {
+        Format::Webp => encode_webp(picture),
+        _ => encode_png(picture, job.level),
+    };
     let stats = draw(
         job,
         job.moments,
         || (),
-        |(), picture| encode_png(&picture, job.level),
-        |i, png| {
-            let path = job.target.path_of(job.moments[i].0);
-            AtomicFile::write(path, &png?, job.force, folder)?;
+        |(), _, picture| encode(picture),
+        |i, bytes| {
+            match job.target.path_of(job.moments[i].0) {
+                Some(path) => AtomicFile::write(path, &bytes?, job.force, folder)?,
+                None => {
+                    let mut out = Output::stdout(false);
+                    out.write_all(&bytes?).map_err(|source| picture::Error::Stdout { source })?;
+                    out.commit()?;
+                }
+            }
             bar.inc(1);
             Ok(())
         },
@@ -128,42 +154,48 @@ fn stills(job: &Job, say: &Say) -> Result<FrameStats, Failure> {
     stats
 }
 
-fn film(job: &Job) -> Film {
-    Film {
-        size: job.size,
-        frames: job.moments.len() as u32,
-        rate: job.rate,
-        plays: 0,
-        transparent: job.transparent,
-        matte: [255; 3],
-    }
-}
-
-fn apng(job: &Job, path: &Path, say: &Say) -> Result<FrameStats, Failure> {
-    let mut file = AtomicFile::create(path, job.force, Folder::MustExist).map_err(failed)?;
-    let mut writer = ApngWriter::new(&mut file, film(job), job.level).map_err(failed)?;
+/// All frames into one file.
+fn film(job: &Job, say: &Say) -> Result<FrameStats, Fault> {
+    let film =
+        Film { transparent: job.transparent, ..Film::new(job.size, job.moments.len() as u32, job.rate) };
+    let format = job.target.format();
+    // WebP goes back to its head, which a pipe cannot.
+    let mut out = match job.target.path_of(0) {
+        Some(path) => Output::file(path, job.force, Folder::MustExist)?,
+        None => Output::stdout(format == Format::Webp),
+    };
+    let coding = match format {
+        Format::Gif => gif_coding(job, &film, say)?,
+        Format::Webp => Coding::Webp,
+        Format::Y4m => Coding::Y4m,
+        _ => Coding::Apng(job.level),
+    };
+    let mut writer = FilmWriter::new(&mut out, film, &coding)?;
     let bar = say.progress(job.moments.len());
     let stats = draw(
         job,
         job.moments,
-        || (),
-        |(), picture| picture,
-        |_, picture| {
+        || FrameEncoder::new(film, &coding),
+        |encoder, before, now| encoder.encode(before, now),
+        |_, frame| {
             bar.inc(1);
-            writer.write(&picture)
+            writer.write(frame?)
         },
     )?;
     bar.finish_and_clear();
-    writer.finish().map_err(failed)?;
-    file.commit().map_err(failed)?;
+    let report = writer.finish()?;
+    if report.dropped > 0 {
+        let dropped = report.dropped;
+        say.note(&format!(
+            "{dropped} frames were too short for GIF; the film's length is right without them"
+        ));
+    }
+    out.commit()?;
     Ok(stats)
 }
 
-fn gif(job: &Job, path: &Path, say: &Say) -> Result<FrameStats, Failure> {
-    let film = film(job);
-    let mut file = AtomicFile::create(path, job.force, Folder::MustExist).map_err(failed)?;
-
-    // A few frames, spread over the film, decide on its colours and its dithering.
+/// The palette and the dithering of a GIF: a few frames, spread over the film, decide.
+fn gif_coding(job: &Job, film: &Film, say: &Say) -> Result<Coding, Fault> {
     let n = job.moments.len();
     let few = n.min(PALETTE_FRAMES);
     let spread: Vec<(i64, f64)> = (0..few).map(|k| job.moments[k * n / few]).collect();
@@ -172,41 +204,18 @@ fn gif(job: &Job, path: &Path, say: &Say) -> Result<FrameStats, Failure> {
         job,
         &spread,
         || (),
-        |(), picture| picture,
+        |(), _, picture| picture.clone(),
         |_, picture| {
             samples.push(picture);
             Ok(())
         },
     )?;
-    let palette = Palette::from_frames(&samples, 256, &film);
-    let (dither, scores) = choose_dither(&samples, &palette, &film);
-    drop(samples);
+    let palette = Palette::from_frames(&samples, 256, film);
+    let (dither, scores) = choose_dither(&samples, &palette, film);
     for s in scores {
         let chosen = if s.dither == dither { ", chosen" } else { "" };
         let name = s.dither.name();
         say.detail(&format!("dithering {name}: error {:.3}, flicker {:.3}{chosen}", s.error, s.flicker));
     }
-
-    let mut writer = GifWriter::new(&mut file, film, &palette, dither).map_err(failed)?;
-    let bar = say.progress(n);
-    let stats = draw(
-        job,
-        job.moments,
-        || Mapper::new(&palette, &film),
-        |mapper, picture| mapper.map(&picture, dither),
-        |_, indexed| {
-            bar.inc(1);
-            writer.write_indexed(indexed)
-        },
-    )?;
-    bar.finish_and_clear();
-    let (_, report) = writer.finish().map_err(failed)?;
-    if report.dropped > 0 {
-        say.note(&format!(
-            "{} frames were too short for GIF; the film's length is right without them",
-            report.dropped
-        ));
-    }
-    file.commit().map_err(failed)?;
-    Ok(stats)
+    Ok(Coding::Gif(palette, dither))
 }

@@ -137,7 +137,7 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
 
 /// Refuse to write over what is being read, `--force` or not.
 fn keep_inputs(args: &Args, target: &Target) -> Result<(), Failure> {
-    let Ok(output) = target.path_of(1).canonicalize() else { return Ok(()) };
+    let Some(Ok(output)) = target.path_of(1).map(|p| p.canonicalize()) else { return Ok(()) };
     for input in [Some(&args.input), args.poses.as_ref()].into_iter().flatten() {
         if input.canonicalize().is_ok_and(|i| i == output) {
             let message = format!("-o {}: this is the input; choose another name", input.display());
@@ -161,7 +161,7 @@ fn moments(
     let timed = |n: i64| (n, frame_time(range.start, n, args.fps));
     match (&args.frames, target) {
         (Some(set), _) => Ok(set.iter().map(timed).collect()),
-        (None, Target::Still(_)) => Ok(vec![timed(1)]),
+        (None, target) if !target.takes_a_clip() => Ok(vec![timed(1)]),
         (None, _) => {
             let count = frame_count(range, args.fps.fps(), MOST_FRAMES);
             let count = count

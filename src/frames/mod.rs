@@ -3,7 +3,7 @@
 mod ordered;
 mod view;
 
-pub use ordered::{Stop, in_order};
+pub use ordered::{Stop, in_order, in_order_pairs};
 pub use view::{Framing, View, ViewError};
 
 use crate::asset::Asset;
