@@ -11,7 +11,7 @@ mod worker;
 
 pub use framing::{Framing, Turns};
 pub use look::{Look, Shading};
-pub use ordered::{Stop, in_order};
+pub use ordered::{Stop, in_order, in_order_pairs};
 pub use view::{FramingDesc, Pivot, View, ViewError};
 pub use worker::Worker;
 
