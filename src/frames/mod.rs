@@ -15,8 +15,8 @@ mod view;
 mod worker;
 
 pub use framing::{Framing, Turns};
-pub use look::Look;
-pub use ordered::{Stop, in_order};
+pub use look::{Look, Shading};
+pub use ordered::{Stop, in_order, in_order_pairs};
 pub use overlay::{BonesDesc, Onion, Overlays, PathDesc};
 pub use view::{FramingDesc, Pivot, View, ViewError};
 pub use worker::Worker;
@@ -25,8 +25,8 @@ use crate::asset::Asset;
 use crate::character::Instance;
 use crate::fk::Posed;
 use crate::image::{Image, Rgba8, develop::Grade};
-use crate::render::Settings;
 use crate::render::raster::{IdImage, Stats};
+use crate::render::{Settings, Window};
 use crate::scene::{Camera, Material, Object, Scene};
 use crate::skin::Deformed;
 use crate::time::{self, Range, Wrap};
@@ -53,6 +53,8 @@ pub struct ShotDesc {
     pub overlays: Overlays,
     /// Size and samples of the pictures.
     pub settings: Settings,
+    /// The part of the pictures that is drawn: to the same bytes as in the whole.
+    pub crop: Option<Window>,
 }
 
 impl Default for ShotDesc {
@@ -66,6 +68,7 @@ impl Default for ShotDesc {
             look: Look::default(),
             overlays: Overlays::default(),
             settings: Settings::default(),
+            crop: None,
         }
     }
 }
@@ -147,8 +150,7 @@ impl<'a> Shot<'a> {
     /// # Panics
     /// If the asset has no such clip.
     pub fn new(asset: &'a Asset, desc: ShotDesc) -> Result<Self, ViewError> {
-        let mut materials = asset.materials.clone();
-        materials.push(Material::default());
+        let materials = look::materials(asset, &desc.look);
         let aspect = aspect(&desc.settings);
         let range = desc.clip.map(|c| asset.character.clips()[c].playback()).unwrap_or_default();
         let mut worker = Worker::default();
@@ -163,6 +165,14 @@ impl<'a> Shot<'a> {
     /// What was asked for.
     pub fn desc(&self) -> &ShotDesc {
         &self.desc
+    }
+
+    /// Pixels a row, and rows, of its pictures.
+    pub fn size(&self) -> [usize; 2] {
+        let Settings { width, height, .. } = self.desc.settings;
+        let whole = Window { x: 0, y: 0, width, height };
+        let part = self.desc.crop.unwrap_or(whole).within(width, height);
+        [part.width, part.height]
     }
 
     /// Draw a moment with the buffers of `worker`.
@@ -205,6 +215,7 @@ impl<'a> Shot<'a> {
         let start = Instant::now();
         let camera = self.stand.camera(moment, &worker.posed, &worker.deformed);
         let scene = self.scene(camera, &worker.posed, &worker.deformed);
+        worker.rasterizer.set_window(self.desc.crop);
         stats.raster = draw(&scene, &mut worker.rasterizer);
         stats.times.draw = start.elapsed();
         stats
@@ -236,18 +247,20 @@ impl<'a> Shot<'a> {
             Object {
                 mesh,
                 positions: &d.positions,
-                normals: &d.normals,
+                normals: if self.desc.look.shading == Shading::Facets { &[] } else { &d.normals },
                 tangents: &d.tangents,
                 material,
                 mirrored: d.mirrored,
             }
         };
-        let (ambient, lights) = look::lights(&self.asset.lights, posed, self.center, &camera);
+        let look = &self.desc.look;
+        let lit = look::lights(look, &self.asset.lights, posed, self.center, &camera);
         Scene {
             camera,
-            ambient,
-            lights,
-            background: self.desc.look.background,
+            ambient: lit.ambient,
+            lights: lit.lights,
+            style: lit.style,
+            background: look.background,
             objects: character.instances().iter().zip(deformed).map(object).collect(),
             materials: &self.materials,
             textures: &self.asset.textures,

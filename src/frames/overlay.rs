@@ -148,6 +148,7 @@ impl Shot<'_> {
         self.pose(moment.time, worker, &mut stats);
         let camera = self.stand.camera(moment, &worker.posed, &worker.deformed);
 
+        worker.rasterizer.set_window(self.desc.crop);
         let whole = overlays.onion.is_none() && overlays.xray.is_none();
         if whole {
             self.character(&camera, self.desc.look.background, worker, out, &mut stats);
@@ -177,7 +178,7 @@ impl Shot<'_> {
 
     /// An empty picture of the shot's size.
     fn clear(&self, out: &mut Image) {
-        (out.width, out.height) = (self.desc.settings.width, self.desc.settings.height);
+        [out.width, out.height] = self.size();
         out.pixels.clear();
         out.pixels.resize(out.width * out.height, [0.0; 4]);
     }

@@ -4,6 +4,7 @@ pub mod channel;
 mod material;
 mod sample;
 mod shade;
+mod styled;
 
 // A loop that counts lanes is what becomes one vector instruction; iterators do not always.
 #[allow(clippy::needless_range_loop)]
@@ -39,6 +40,34 @@ pub enum SettingsError {
         /// What was asked for.
         found: u8,
     },
+}
+
+/// A part of a picture, in pixels from its top left corner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Window {
+    /// First column.
+    pub x: usize,
+    /// First row.
+    pub y: usize,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+impl Window {
+    /// What of it lies in a picture of these sides.
+    ///
+    /// ```
+    /// use sinew::render::Window;
+    /// let w = Window { x: 6, y: 0, width: 4, height: 2 };
+    /// assert_eq!(w.within(8, 8), Window { width: 2, ..w });
+    /// assert_eq!(w.within(4, 4), Window { x: 4, width: 0, ..w });
+    /// ```
+    pub fn within(self, width: usize, height: usize) -> Self {
+        let (x, y) = (self.x.min(width), self.y.min(height));
+        Self { x, y, width: self.width.min(width - x), height: self.height.min(height - y) }
+    }
 }
 
 impl Settings {
