@@ -18,10 +18,12 @@ mod delta;
 mod dither;
 mod film;
 mod gif;
+mod gif_frames;
 mod judge;
 mod nearest;
 mod palette;
 mod png;
+mod read;
 mod target;
 
 pub use apng::ApngWriter;
@@ -32,6 +34,7 @@ pub use gif::GifWriter;
 pub use judge::{DitherScore, choose_dither};
 pub use palette::Palette;
 pub use png::{PngLevel, encode_png};
+pub use read::{Frame, Frames, Pixels, ReadError, frames_of};
 pub use target::{Format, Pattern, Target, TargetError};
 
 use crate::image::Rgba8;
