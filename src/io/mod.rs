@@ -2,6 +2,8 @@
 
 #[cfg(feature = "io")]
 pub mod gltf;
+#[cfg(all(feature = "io", feature = "pictures"))]
+pub mod manifest;
 #[cfg(feature = "io")]
 pub mod notes;
 #[cfg(feature = "pictures")]
@@ -10,6 +12,8 @@ pub mod picture;
 pub mod ply;
 #[cfg(feature = "io")]
 pub mod rig_json;
+#[cfg(all(feature = "io", feature = "pictures"))]
+pub mod sheet_json;
 
 use crate::asset::Asset;
 

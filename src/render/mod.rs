@@ -1,8 +1,10 @@
 //! Scenes to pictures.
 
+pub mod channel;
 mod material;
 mod sample;
 mod shade;
+mod styled;
 
 // A loop that counts lanes is what becomes one vector instruction; iterators do not always.
 #[allow(clippy::needless_range_loop)]

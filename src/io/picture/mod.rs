@@ -19,23 +19,32 @@ mod dither;
 mod film;
 mod gif;
 mod gif_frames;
+mod indexed;
 mod judge;
 mod nearest;
 mod palette;
+mod palette_file;
+mod pixel_art;
 mod png;
 mod read;
 mod target;
+mod template;
+mod unnamed;
 
 pub use apng::ApngWriter;
 pub use atomic::{AtomicFile, Folder, cleanup_temporaries};
 pub use dither::{Dither, Indexed, Mapper};
 pub use film::{Film, FilmReport};
 pub use gif::GifWriter;
+pub use indexed::{Data, encode_data_png, encode_indexed_png};
 pub use judge::{DitherScore, choose_dither};
 pub use palette::Palette;
+pub use palette_file::PaletteError;
+pub use pixel_art::{PixelArt, PixelArtDesc};
 pub use png::{PngLevel, encode_png};
 pub use read::{Frame, Frames, Pixels, ReadError, frames_of};
 pub use target::{Format, Pattern, Target, TargetError};
+pub use template::{Fields, Template, TemplateError};
 
 use crate::image::Rgba8;
 use std::path::PathBuf;
@@ -137,6 +146,17 @@ pub enum Error {
 /// `640 × 480`.
 fn sides(s: &[usize; 2]) -> String {
     format!("{} × {}", s[0], s[1])
+}
+
+/// Refuse buffers that do not hold `each` bytes for every pixel of a PNG picture.
+fn check_sides([width, height]: [usize; 2], bytes: usize, each: usize) -> Result<(), Error> {
+    let limit = i32::MAX as usize;
+    let fits = |n: usize| (1..=limit).contains(&n);
+    let want = width.checked_mul(height).and_then(|n| n.checked_mul(each));
+    if fits(width) && fits(height) && want == Some(bytes) {
+        return Ok(());
+    }
+    Err(Error::Size { width, height, bytes, format: "PNG", limit })
 }
 
 /// Refuse pictures whose buffer does not match their sides, or whose sides the format cannot say.

@@ -1,6 +1,7 @@
 //! Frames into files: drawn and encoded by workers, written in order.
 
-use super::{Failure, say::Say};
+use super::time::Frame;
+use crate::cli::{Failure, say::Say};
 use sinew::frames::{FrameStats, Shot, Stop, Worker, in_order};
 use sinew::image::Rgba8;
 use sinew::io::picture::{
@@ -17,18 +18,27 @@ const PALETTE_FRAMES: usize = 16;
 /// What is to be written.
 pub struct Job<'a> {
     pub shot: &'a Shot<'a>,
-    /// Frame numbers and seconds.
-    pub moments: &'a [(i64, f64)],
+    pub frames: &'a [Frame],
     pub rate: Rate,
-    pub size: [usize; 2],
     pub transparent: bool,
     pub target: &'a Target,
     pub level: PngLevel,
     pub threads: usize,
     pub force: bool,
+    /// Compute hashes.
+    pub hash: bool,
 }
 
-pub fn write(job: &Job, say: &Say) -> Result<(), Failure> {
+/// What was written.
+#[derive(Default)]
+pub struct Written {
+    /// A hash a frame, if they were asked for: of its file or, in a film, of its pixels.
+    pub hashes: Vec<String>,
+    /// What the last frame cost.
+    pub stats: FrameStats,
+}
+
+pub fn write(job: &Job, say: &Say) -> Result<Written, Failure> {
     // A temporary must not outlive Ctrl-C or a request to terminate; the handler runs on a thread of its own.
     let _ = ctrlc::set_handler(|| {
         picture::cleanup_temporaries();
@@ -36,28 +46,29 @@ pub fn write(job: &Job, say: &Say) -> Result<(), Failure> {
     });
     refuse_existing(job)?;
     let start = Instant::now();
-    let total = match job.target {
+    let stats = match job.target {
         Target::Still(_) | Target::Sequence(_) => stills(job, say)?,
         Target::Film(path, Format::Apng) => apng(job, path, say)?,
         Target::Film(path, _) => gif(job, path, say)?,
     };
-    let n = job.moments.len();
+    let written = Written { stats, hashes: vec![] };
+    let n = job.frames.len();
     let seconds = start.elapsed().as_secs_f64();
     say.detail(&format!(
         "{n} frames in {seconds:.3} s ({:.2} ms each), a frame: {} bones, {} vertices; {:?}",
         1e3 * seconds / n as f64,
-        total.bones,
-        total.vertices,
-        total.raster
+        written.stats.bones,
+        written.stats.vertices,
+        written.stats.raster
     ));
     say.note(&match job.target {
         Target::Sequence(_) if n > 1 => {
-            let path = |i: usize| job.target.path_of(job.moments[i].0).display().to_string();
+            let path = |i: usize| job.target.path_of(job.frames[i].number).display().to_string();
             format!("wrote {n} frames, {} … {}", path(0), path(n - 1))
         }
-        _ => format!("wrote {}", job.target.path_of(job.moments[0].0).display()),
+        _ => format!("wrote {}", job.target.path_of(job.frames[0].number).display()),
     });
-    Ok(())
+    Ok(written)
 }
 
 fn failed(e: picture::Error) -> Failure {
@@ -69,8 +80,8 @@ fn refuse_existing(job: &Job) -> Result<(), Failure> {
     if job.force {
         return Ok(());
     }
-    for (number, _) in job.moments {
-        let path = job.target.path_of(*number);
+    for frame in job.frames {
+        let path = job.target.path_of(frame.number);
         if path.exists() {
             let message = format!("{}: the file exists; --force overwrites it", path.display());
             return Err(Failure::Run(message));
@@ -82,7 +93,7 @@ fn refuse_existing(job: &Job) -> Result<(), Failure> {
 /// Draw all moments in parallel, finish each on its worker, and hand the results on in order.
 fn draw<S, T: Send>(
     job: &Job,
-    moments: &[(i64, f64)],
+    frames: &[Frame],
     state: impl Fn() -> S + Sync,
     finish: impl Fn(&mut S, Rgba8) -> T + Sync,
     mut receive: impl FnMut(usize, T) -> Result<(), picture::Error>,
@@ -92,10 +103,10 @@ fn draw<S, T: Send>(
     let start = || (Worker::default(), state());
     let one = |(worker, s): &mut (Worker, S), i: usize| {
         let mut out = Rgba8::default();
-        let stats = job.shot.draw(moments[i].1, worker, &mut out);
+        let stats = job.shot.draw(frames[i].moment, worker, &mut out);
         (stats, finish(s, out))
     };
-    let done = in_order(moments.len(), job.threads, start, one, |i, (stats, result)| {
+    let done = in_order(frames.len(), job.threads, start, one, |i, (stats, result)| {
         last = stats;
         receive(i, result).map_err(|e| {
             fault = Some(e);
@@ -111,14 +122,14 @@ fn draw<S, T: Send>(
 
 fn stills(job: &Job, say: &Say) -> Result<FrameStats, Failure> {
     let folder = if matches!(job.target, Target::Sequence(_)) { Folder::Create } else { Folder::MustExist };
-    let bar = say.progress(job.moments.len());
+    let bar = say.progress(job.frames.len());
     let stats = draw(
         job,
-        job.moments,
+        job.frames,
         || (),
         |(), picture| encode_png(&picture, job.level),
         |i, png| {
-            let path = job.target.path_of(job.moments[i].0);
+            let path = job.target.path_of(job.frames[i].number);
             AtomicFile::write(path, &png?, job.force, folder)?;
             bar.inc(1);
             Ok(())
@@ -130,8 +141,8 @@ fn stills(job: &Job, say: &Say) -> Result<FrameStats, Failure> {
 
 fn film(job: &Job) -> Film {
     Film {
-        size: job.size,
-        frames: job.moments.len() as u32,
+        size: [job.shot.desc().settings.width, job.shot.desc().settings.height],
+        frames: job.frames.len() as u32,
         rate: job.rate,
         plays: 0,
         transparent: job.transparent,
@@ -142,10 +153,10 @@ fn film(job: &Job) -> Film {
 fn apng(job: &Job, path: &Path, say: &Say) -> Result<FrameStats, Failure> {
     let mut file = AtomicFile::create(path, job.force, Folder::MustExist).map_err(failed)?;
     let mut writer = ApngWriter::new(&mut file, film(job), job.level).map_err(failed)?;
-    let bar = say.progress(job.moments.len());
+    let bar = say.progress(job.frames.len());
     let stats = draw(
         job,
-        job.moments,
+        job.frames,
         || (),
         |(), picture| picture,
         |_, picture| {
@@ -164,9 +175,9 @@ fn gif(job: &Job, path: &Path, say: &Say) -> Result<FrameStats, Failure> {
     let mut file = AtomicFile::create(path, job.force, Folder::MustExist).map_err(failed)?;
 
     // A few frames, spread over the film, decide on its colours and its dithering.
-    let n = job.moments.len();
+    let n = job.frames.len();
     let few = n.min(PALETTE_FRAMES);
-    let spread: Vec<(i64, f64)> = (0..few).map(|k| job.moments[k * n / few]).collect();
+    let spread: Vec<Frame> = (0..few).map(|k| job.frames[k * n / few]).collect();
     let mut samples = Vec::with_capacity(few);
     draw(
         job,
@@ -191,7 +202,7 @@ fn gif(job: &Job, path: &Path, say: &Say) -> Result<FrameStats, Failure> {
     let bar = say.progress(n);
     let stats = draw(
         job,
-        job.moments,
+        job.frames,
         || Mapper::new(&palette, &film),
         |mapper, picture| mapper.map(&picture, dither),
         |_, indexed| {
