@@ -122,12 +122,10 @@ pub mod render;
 
 pub mod frames;
 
-<<<<<<< HEAD
 pub mod measure;
-=======
+
 #[cfg(feature = "pictures")]
 pub mod sheet;
->>>>>>> main
 
 #[cfg(any(feature = "io", feature = "pictures"))]
 pub mod io;

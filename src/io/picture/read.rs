@@ -19,7 +19,7 @@ const MEMORY: u64 = 1 << 30;
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The bytes are of no format that is read.
-    #[error("expected a PNG, APNG, GIF, WebP or JPEG picture, found {found}")]
+    #[error("expected a PNG, APNG, GIF, WebP, JPEG or OpenEXR picture, found {found}")]
     Unknown {
         /// The first bytes, or that there are none.
         found: String,
@@ -87,15 +87,15 @@ pub struct Frame {
 /// ```
 pub struct Frames<'a> {
     format: &'static str,
-    source: Box<dyn Iterator<Item = Result<Frame, String>> + Send + 'a>,
+    source: Box<dyn Iterator<Item = Result<Frame, String>> + 'a>,
     came: usize,
     /// Pixels that may still come.
     left: u64,
-    failed: bool,
+    ended: bool,
 }
 
 impl Frames<'_> {
-    /// PNG, APNG, GIF, WebP or JPEG.
+    /// PNG, APNG, GIF, WebP, JPEG or OpenEXR.
     pub fn format(&self) -> &'static str {
         self.format
     }
@@ -139,12 +139,12 @@ pub fn frames_of(bytes: &[u8]) -> Result<Frames<'_>, ReadError> {
             (format, boxed(still(decoder)))
         }
     };
-    Ok(Frames { format, source, came: 0, left: FILM, failed: false })
+    Ok(Frames { format, source, came: 0, left: FILM, ended: false })
 }
 
-type Source<'a> = Box<dyn Iterator<Item = Result<Frame, String>> + Send + 'a>;
+type Source<'a> = Box<dyn Iterator<Item = Result<Frame, String>> + 'a>;
 
-fn boxed<'a>(source: impl Iterator<Item = Result<Frame, String>> + Send + 'a) -> Source<'a> {
+fn boxed<'a>(source: impl Iterator<Item = Result<Frame, String>> + 'a) -> Source<'a> {
     Box::new(source)
 }
 
@@ -154,6 +154,7 @@ fn name(format: ImageFormat) -> Option<&'static str> {
         ImageFormat::Gif => Some("GIF"),
         ImageFormat::WebP => Some("WebP"),
         ImageFormat::Jpeg => Some("JPEG"),
+        ImageFormat::OpenExr => Some("OpenEXR"),
         _ => None,
     }
 }
@@ -190,9 +191,7 @@ fn gif(bytes: &[u8]) -> Result<GifFrames<'_>, ReadError> {
 }
 
 /// The one frame of a still, decoded when it is asked for.
-fn still<'a>(
-    decoder: impl ImageDecoder + Send + 'a,
-) -> impl Iterator<Item = Result<Frame, String>> + Send + 'a {
+fn still<'a>(decoder: impl ImageDecoder + 'a) -> impl Iterator<Item = Result<Frame, String>> + 'a {
     let mut decoder = Some(decoder);
     std::iter::from_fn(move || {
         let image = DynamicImage::from_decoder(decoder.take()?).map_err(|e| e.to_string());
@@ -200,7 +199,7 @@ fn still<'a>(
     })
 }
 
-fn film<'a>(decoder: impl AnimationDecoder<'a>) -> impl Iterator<Item = Result<Frame, String>> + Send + 'a {
+fn film<'a>(decoder: impl AnimationDecoder<'a>) -> impl Iterator<Item = Result<Frame, String>> + 'a {
     decoder.into_frames().map(|frame| {
         let frame = frame.map_err(|e| e.to_string())?;
         let delay_ms = frame.delay().numer_denom_ms();
@@ -223,10 +222,9 @@ impl Iterator for Frames<'_> {
     type Item = Result<Frame, ReadError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if self.failed {
-            return None;
-        }
-        let frame = self.source.next()?;
+        let frame = if self.ended { None } else { self.source.next() };
+        self.ended = frame.is_none();
+        let frame = frame?;
         self.came += 1;
         let refuse = |message| ReadError::Decode { frame: self.came, format: self.format, message };
         let checked = frame.map_err(refuse).and_then(|frame| {
@@ -238,7 +236,7 @@ impl Iterator for Frames<'_> {
             self.left = left.ok_or(ReadError::Size { width, height })?;
             Ok(frame)
         });
-        self.failed = checked.is_err();
+        self.ended = checked.is_err();
         Some(checked)
     }
 }
