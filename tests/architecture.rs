@@ -25,6 +25,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("asset", &["character", "scene", "skeleton"]),
     ("render", &["scene", "image", "mesh", "math"]),
     ("frames", &["time", "skeleton", "pose", "fk", "skin", "character", "image", "scene", "asset", "render"]),
+    ("measure", &["image"]),
     // Frames side by side, wherever they came from: it cuts and copies, and never draws.
     ("sheet", &["time", "image"]),
     // Formats: data rooms only, never frames or render.
