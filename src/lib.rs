@@ -122,6 +122,9 @@ pub mod render;
 
 pub mod frames;
 
+#[cfg(feature = "pictures")]
+pub mod sheet;
+
 #[cfg(any(feature = "io", feature = "pictures"))]
 pub mod io;
 

@@ -25,6 +25,8 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("asset", &["character", "scene", "skeleton"]),
     ("render", &["scene", "image", "mesh", "math"]),
     ("frames", &["time", "skeleton", "pose", "fk", "skin", "character", "image", "scene", "asset", "render"]),
+    // Frames side by side, wherever they came from: it cuts and copies, and never draws.
+    ("sheet", &["time", "image"]),
     // Formats: data rooms only, never frames or render.
     (
         "io",
@@ -41,13 +43,14 @@ const ROOMS: &[(&str, &[&str])] = &[
             "image",
             "scene",
             "asset",
+            "sheet",
         ],
     ),
 ];
 
 /// Files below one room that must not know each other.
 const STRANGERS: &[(&str, &[&str])] =
-    &[("skin", &["linear", "rigid"]), ("io", &["gltf", "notes", "picture", "rig_json"])];
+    &[("skin", &["linear", "rigid"]), ("io", &["gltf", "notes", "picture", "rig_json", "sheet_json"])];
 
 #[test]
 fn arrows_go_one_way() {

@@ -1,26 +1,35 @@
 //! Times to pictures: the one place where animation meets rendering.
 
+mod channels;
+mod effects;
 mod fit;
+mod framing;
 mod look;
 mod ordered;
+mod stand;
 mod view;
 mod worker;
 
-pub use look::{Look, Shading};
+pub use framing::{Framing, Turns};
+pub use look::{GroundLook, Look, Shading, Shadows};
 pub use ordered::{Stop, in_order};
-pub use view::{Framing, View, ViewError};
+pub use view::{FramingDesc, Pivot, View, ViewError};
 pub use worker::Worker;
 
 use crate::asset::Asset;
 use crate::character::Instance;
 use crate::fk::Posed;
+use crate::image::develop::Developer;
 use crate::image::{Image, Rgba8};
 use crate::render::Settings;
 use crate::render::raster::{IdImage, Stats};
-use crate::scene::{Camera, Material, Object, Scene};
+use crate::scene::{Material, Object, Scene};
 use crate::skin::Deformed;
 use crate::time::{self, Range, Wrap};
-use glam::{Affine3A, DVec3};
+use effects::Stage;
+use fit::Span;
+use glam::DVec3;
+use stand::Stand;
 use std::time::{Duration, Instant};
 
 /// What is filmed, from where, and how it looks.
@@ -32,6 +41,8 @@ pub struct ShotDesc {
     pub wrap: Wrap,
     /// Which camera.
     pub view: View,
+    /// How it holds the character in its picture.
+    pub framing: FramingDesc,
     /// Light and background.
     pub look: Look,
     /// Size and samples of the pictures.
@@ -45,6 +56,7 @@ impl Default for ShotDesc {
             clip: None,
             wrap: Wrap::Clamp,
             view: View::default(),
+            framing: FramingDesc::default(),
             look: Look::default(),
             settings: Settings::default(),
         }
@@ -56,7 +68,8 @@ impl Default for ShotDesc {
 pub struct Moment {
     /// Seconds in the clip.
     pub time: f64,
-    /// Radians by which an orbiting camera has walked on, its lights with it: turntables and sheets of directions.
+    /// Radians by which an orbiting camera has walked on, its lights with it: turntables and sheets of directions. What it walks
+    /// around says [`FramingDesc::pivot`].
     pub turn: f32,
 }
 
@@ -72,12 +85,15 @@ impl From<f64> for Moment {
 pub struct Shot<'a> {
     asset: &'a Asset,
     desc: ShotDesc,
-    orbit: Camera,
+    stand: Stand<'a>,
     range: Range,
     /// The asset's materials, and the one that meshes without a material wear.
     materials: Vec<Material>,
     /// The world point that the scene's frame has its origin at.
     center: DVec3,
+    /// What the look needs beside the scene itself.
+    stage: Option<Stage>,
+    developer: Developer,
 }
 
 /// What a frame cost.
@@ -121,7 +137,7 @@ impl<'a> Shot<'a> {
     /// more than [`Framing::VERTICES`] vertices in all. Which frames are drawn later makes no difference.
     ///
     /// # Errors
-    /// [`ViewError`] if the asset has no such camera.
+    /// [`ViewError`] if the asset has no such camera or bone, or if the view leaves no picture plane.
     ///
     /// # Panics
     /// If the asset has no such clip.
@@ -133,19 +149,11 @@ impl<'a> Shot<'a> {
         let mut worker = Worker::default();
         worker.evaluate(asset, desc.clip, range.start);
         let center = asset.character.center(&worker.posed);
-        let framing = match desc.view {
-            View::Orbit { yaw, pitch, fov_y } => {
-                let mut framing = Framing::new(yaw, pitch, fov_y, aspect);
-                fit::fit(asset, desc.clip, center, &mut worker, &mut framing);
-                framing
-            }
-            View::Mounted(camera) if camera >= asset.cameras.len() => {
-                return Err(ViewError { camera, count: asset.cameras.len() });
-            }
-            View::Mounted(_) => Framing::new(0.0, 0.0, 1.0, aspect),
-        };
-        let orbit = framing.camera();
-        Ok(Self { asset, desc, orbit, range, materials, center })
+        let span = Span { asset, clip: desc.clip, center };
+        let stand = Stand::new(&span, &desc.view, desc.framing, aspect, &mut worker)?;
+        let stage = Stage::new(&span, &desc.look, &materials, &mut worker);
+        let developer = desc.look.grade.developer();
+        Ok(Self { asset, desc, stand, range, materials, center, stage, developer })
     }
 
     /// What was asked for.
@@ -155,12 +163,25 @@ impl<'a> Shot<'a> {
 
     /// Draw a moment with the buffers of `worker`.
     pub fn draw(&self, moment: impl Into<Moment>, worker: &mut Worker, out: &mut Rgba8) -> FrameStats {
-        self.with_scene(moment.into(), worker, |scene, w| w.draw(scene, &self.desc.settings, out))
+        if self.desc.look.is_direct() {
+            return self.with_scene(moment.into(), worker, |scene, w| w.draw(scene, &self.desc.settings, out));
+        }
+        let mut light = std::mem::take(&mut worker.light);
+        let stats = self.draw_linear(moment, worker, &mut light);
+        self.developer.develop(&light, out);
+        worker.light = light;
+        stats
     }
 
-    /// Draw a moment in linear light, alpha premultiplied.
+    /// Draw a moment in linear light, alpha premultiplied. The look's grade is not applied.
     pub fn draw_linear(&self, moment: impl Into<Moment>, worker: &mut Worker, out: &mut Image) -> FrameStats {
-        self.with_scene(moment.into(), worker, |scene, w| w.draw_linear(scene, &self.desc.settings, out))
+        let mut effects = std::mem::take(&mut worker.effects);
+        let stats = self.with_scene(moment.into(), worker, |scene, w| match &self.stage {
+            Some(stage) => stage.draw(&self.desc, scene, w, &mut effects, out),
+            None => w.draw_linear(scene, &self.desc.settings, out),
+        });
+        worker.effects = effects;
+        stats
     }
 
     /// Which object and triangle is seen at the centre of each pixel of a moment, and how far away.
@@ -204,7 +225,7 @@ impl<'a> Shot<'a> {
                 mirrored: d.mirrored,
             }
         };
-        let camera = self.camera(moment, posed);
+        let camera = self.stand.camera(moment, posed, deformed);
         let look = &self.desc.look;
         let lit = look::lights(look, &self.asset.lights, posed, self.center, &camera);
         Scene {
@@ -218,26 +239,4 @@ impl<'a> Shot<'a> {
             textures: &self.asset.textures,
         }
     }
-
-    fn camera(&self, moment: Moment, posed: &Posed) -> Camera {
-        let View::Mounted(index) = self.desc.view else { return turned(self.orbit, moment.turn) };
-        let mounted = &self.asset.cameras[index];
-        // A scaled bone carries its camera, but does not distort it.
-        let (_, rotation, translation) =
-            posed.near(mounted.bone, self.center).to_scale_rotation_translation();
-        Camera {
-            scene_from_view: Affine3A::from_rotation_translation(rotation, translation),
-            projection: mounted.projection,
-            near: mounted.near,
-            far: mounted.near * 1e6,
-        }
-    }
-}
-
-/// The camera after a walk of `turn` radians around the vertical axis of the scene's origin.
-fn turned(camera: Camera, turn: f32) -> Camera {
-    if turn == 0.0 {
-        return camera;
-    }
-    Camera { scene_from_view: Affine3A::from_rotation_y(turn) * camera.scene_from_view, ..camera }
 }

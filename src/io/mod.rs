@@ -12,6 +12,8 @@ pub mod picture;
 pub mod ply;
 #[cfg(feature = "io")]
 pub mod rig_json;
+#[cfg(all(feature = "io", feature = "pictures"))]
+pub mod sheet_json;
 
 use crate::asset::Asset;
 

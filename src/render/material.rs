@@ -142,6 +142,12 @@ fn highlight(maps: &Maps, m: &Material) -> (V8, F8) {
     }
 }
 
+/// The shading normal, normal map included, scene space.
+#[inline(always)]
+pub(crate) fn shading_normal(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> V8 {
+    normal(&Maps::new(isa, scene, m, p), m, p)
+}
+
 /// The shading normal, on the eye's side.
 #[inline(always)]
 fn normal(maps: &Maps, m: &Material, p: &impl Points) -> V8 {

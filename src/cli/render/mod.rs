@@ -1,6 +1,7 @@
 //! `sinew render`: what is to be drawn, from where, and into which files. One file a group of options.
 
 mod batch;
+mod bone;
 mod camera;
 mod film;
 mod look;
@@ -27,6 +28,8 @@ Examples:
   sinew render fox.glb -o run.####.png --clip Run --fps 30 --background transparent
   sinew render fox.glb -o part.%04d.png --frames 1-48x2,60
   sinew render fox.glb -o side.apng --camera yaw=90,pitch=5,fov=20
+  sinew render fox.glb -o icon.png --camera isometric --background transparent
+  sinew render rigs/fox.json -o round.gif --turntable
   sinew render *.glb --all-clips -o thumbs/{name}-{clip}.gif
   sinew render fox.glb -o farm.####.png --shard 2/4 --manifest part2.json
   sinew render fox.glb --list
@@ -80,7 +83,8 @@ struct Plan {
 fn plan(args: &Args, task: &Task) -> Result<Plan, Failure> {
     let clips = task.import.asset.character.clips();
     let range = task.clip.map_or(Range::default(), |c| clips[c].playback());
-    let frames = args.time.frames(task.input, range, matches!(task.target, Target::Still(_)))?;
+    let alone = matches!(task.target, Target::Still(_));
+    let frames = args.time.frames(task.input, range, alone, args.camera.turntable)?;
     task.target.check_frames(frames.len()).map_err(|e| Failure::Usage(e.to_string()))?;
     let settings = args.output.settings()?;
     Ok(Plan { frames, size: [settings.width, settings.height] })
@@ -94,14 +98,20 @@ fn draw(args: &Args, task: &Task, plan: &Plan, say: &Say) -> Result<Written, Fai
         say.warn(&format!("{}: there are no triangles; the picture will be empty", task.input.display()));
     }
 
+    let range = task.clip.map_or(Range::default(), |c| character.clips()[c].playback());
+    if let Some(note) = args.camera.turntable.and_then(|lap| args.time.seam(range, lap)) {
+        say.note(&note);
+    }
+
     // One picture is drawn by all threads, many by one thread each.
     let threads = args.output.threads();
     let alone = plan.frames.len() == 1;
     let settings = Settings { threads: if alone { threads } else { 1 }, ..args.output.settings()? };
     let desc = ShotDesc {
         clip: task.clip,
-        wrap: args.time.wrap,
+        wrap: args.time.wrap(args.camera.turntable),
         view: args.camera.view(asset)?,
+        framing: args.camera.framing(asset)?,
         look: args.look.look(asset)?,
         settings,
     };

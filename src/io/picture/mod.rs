@@ -18,9 +18,12 @@ mod delta;
 mod dither;
 mod film;
 mod gif;
+mod indexed;
 mod judge;
 mod nearest;
 mod palette;
+mod palette_file;
+mod pixel_art;
 mod png;
 mod target;
 mod template;
@@ -31,8 +34,11 @@ pub use atomic::{AtomicFile, Folder, cleanup_temporaries};
 pub use dither::{Dither, Indexed, Mapper};
 pub use film::{Film, FilmReport};
 pub use gif::GifWriter;
+pub use indexed::{Data, encode_data_png, encode_indexed_png};
 pub use judge::{DitherScore, choose_dither};
 pub use palette::Palette;
+pub use palette_file::PaletteError;
+pub use pixel_art::{PixelArt, PixelArtDesc};
 pub use png::{PngLevel, encode_png};
 pub use target::{Format, Pattern, Target, TargetError};
 pub use template::{Fields, Template, TemplateError};
@@ -137,6 +143,17 @@ pub enum Error {
 /// `640 × 480`.
 fn sides(s: &[usize; 2]) -> String {
     format!("{} × {}", s[0], s[1])
+}
+
+/// Refuse buffers that do not hold `each` bytes for every pixel of a PNG picture.
+fn check_sides([width, height]: [usize; 2], bytes: usize, each: usize) -> Result<(), Error> {
+    let limit = i32::MAX as usize;
+    let fits = |n: usize| (1..=limit).contains(&n);
+    let want = width.checked_mul(height).and_then(|n| n.checked_mul(each));
+    if fits(width) && fits(height) && want == Some(bytes) {
+        return Ok(());
+    }
+    Err(Error::Size { width, height, bytes, format: "PNG", limit })
 }
 
 /// Refuse pictures whose buffer does not match their sides, or whose sides the format cannot say.

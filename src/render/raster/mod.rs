@@ -9,6 +9,7 @@
 //! threads, on the vector instructions that the machine has, or on the order in which tiles are drawn.
 
 mod blend;
+mod channels;
 mod clip;
 mod encode;
 mod fill;
@@ -20,6 +21,7 @@ mod tile;
 mod vertex;
 
 use super::Settings;
+use super::channel::{Channel, Channels};
 use crate::image::{Image, Rgba8};
 use crate::math::simd::{self, Isa};
 use crate::scene::Scene;
@@ -155,6 +157,22 @@ impl Rasterizer {
         out.triangles.resize(n, 0);
         out.depth.resize(n, f32::INFINITY);
         self.paint(scene, &Settings { samples: 1, ..*settings }, encode::id_bands(out))
+    }
+
+    /// Draw what the pixels show beside their colour: the channels that are asked for, and objects always; nothing that
+    /// blends is in them. `out` takes the size of `settings`.
+    ///
+    /// # Panics
+    /// If `settings` do not pass [`Settings::check`].
+    pub fn draw_channels(
+        &mut self,
+        scene: &Scene,
+        settings: &Settings,
+        wanted: &[Channel],
+        out: &mut Channels,
+    ) -> Stats {
+        out.reset(settings.width, settings.height, wanted);
+        self.paint(scene, settings, encode::channel_bands(out))
     }
 
     /// All stages; `bands` are the rows of tiles of the output.
