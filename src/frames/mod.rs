@@ -164,7 +164,8 @@ impl<'a> Shot<'a> {
     /// Draw a moment with the buffers of `worker`.
     pub fn draw(&self, moment: impl Into<Moment>, worker: &mut Worker, out: &mut Rgba8) -> FrameStats {
         if self.desc.look.is_direct() {
-            return self.with_scene(moment.into(), worker, |scene, w| w.draw(scene, &self.desc.settings, out));
+            return self
+                .with_scene(moment.into(), worker, |scene, w| w.draw(scene, &self.desc.settings, out));
         }
         let mut light = std::mem::take(&mut worker.light);
         let stats = self.draw_linear(moment, worker, &mut light);

@@ -48,10 +48,11 @@ impl Backdrop<'_> {
                 if p[3] >= 1.0 {
                     continue;
                 }
-                let behind = match ground.as_ref().and_then(|g| Some(g.over(rays.hit(x, y, g.height)?, plain))) {
-                    Some(c) => c,
-                    None => plain,
-                };
+                let behind =
+                    match ground.as_ref().and_then(|g| Some(g.over(rays.hit(x, y, g.height)?, plain))) {
+                        Some(c) => c,
+                        None => plain,
+                    };
                 let open = 1.0 - p[3];
                 *p = std::array::from_fn(|c| p[c] + open * behind[c]);
             }
@@ -122,14 +123,12 @@ impl Rays {
         let (dx, dy) = (right * pixel, up * -pixel);
         let first = dx * (0.5 - 0.5 * width as f32) + dy * (0.5 - 0.5 * height as f32);
         match camera.projection {
-            Projection::Perspective { .. } => Self {
-                origin: [camera.eye(), Vec3::ZERO, Vec3::ZERO],
-                direction: [first - back, dx, dy],
-            },
-            Projection::Orthographic { .. } => Self {
-                origin: [camera.eye() + first, dx, dy],
-                direction: [-back, Vec3::ZERO, Vec3::ZERO],
-            },
+            Projection::Perspective { .. } => {
+                Self { origin: [camera.eye(), Vec3::ZERO, Vec3::ZERO], direction: [first - back, dx, dy] }
+            }
+            Projection::Orthographic { .. } => {
+                Self { origin: [camera.eye() + first, dx, dy], direction: [-back, Vec3::ZERO, Vec3::ZERO] }
+            }
         }
     }
 
@@ -158,7 +157,8 @@ mod tests {
     #[test]
     fn rays_meet_the_plane_where_the_camera_sees_it() {
         for projection in [Projection::Perspective { fov_y: 0.7 }, Projection::Orthographic { height: 3.0 }] {
-            let camera = Camera::look_at(Vec3::new(2.0, 3.0, 4.0), Vec3::Y * 0.3, Vec3::Y, projection).unwrap();
+            let camera =
+                Camera::look_at(Vec3::new(2.0, 3.0, 4.0), Vec3::Y * 0.3, Vec3::Y, projection).unwrap();
             let (w, h) = (30, 20);
             let rays = Rays::new(&camera, w, h);
             assert!(rays.above(0.5));

@@ -1,7 +1,7 @@
 //! Scenes to pictures.
 
-pub mod channel;
 pub mod backdrop;
+pub mod channel;
 pub mod footprint;
 mod material;
 pub mod outline;
