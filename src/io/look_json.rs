@@ -208,7 +208,10 @@ fn lighting(doc: &Document) -> Result<Option<Lighting>, LookError> {
     }
     let lamps = doc.lamps.as_deref().unwrap_or_default();
     if lamps.len() > MAX_LAMPS {
-        return Err(LookError::value("lamps", format!("expected at most {MAX_LAMPS}, found {}", lamps.len())));
+        return Err(LookError::value(
+            "lamps",
+            format!("expected at most {MAX_LAMPS}, found {}", lamps.len()),
+        ));
     }
     let [above, below] = match &doc.ambient {
         None => [Vec3::ZERO; 2],
@@ -223,7 +226,10 @@ fn lighting(doc: &Document) -> Result<Option<Lighting>, LookError> {
 fn light(place: &str, color: &Color) -> Result<Vec3, LookError> {
     let c = color.0;
     if !c.is_finite() || c.min_element() < 0.0 {
-        return Err(LookError::value(place, format!("expected numbers of at least 0, found {:?}", c.to_array())));
+        return Err(LookError::value(
+            place,
+            format!("expected numbers of at least 0, found {:?}", c.to_array()),
+        ));
     }
     if c.w != 1.0 {
         return Err(LookError::value(place, "light has no alpha: expected #rrggbb or three numbers"));
@@ -259,8 +265,7 @@ fn lamp(place: &str, doc: &LampDoc) -> Result<Lamp, LookError> {
 
 fn spot(place: &str, doc: &LampDoc) -> Result<LightKind, LookError> {
     only(place, "a spot lamp", doc, &["position", "target", "range", "inner_deg", "outer_deg"])?;
-    let (position, target) =
-        (vector(place, "position", doc.position)?, vector(place, "target", doc.target)?);
+    let (position, target) = (vector(place, "position", doc.position)?, vector(place, "target", doc.target)?);
     let direction = direction(place, "target − position", target - position)?;
     let outer = number(place, "outer_deg", doc.outer_deg.unwrap_or(30.0), 0.1, 90.0)?;
     let inner = number(place, "inner_deg", doc.inner_deg.unwrap_or(0.8 * outer), 0.0, outer)?;
@@ -296,7 +301,8 @@ fn only(place: &str, kind: &str, doc: &LampDoc, fields: &[&str]) -> Result<(), L
 }
 
 fn vector(place: &str, field: &str, found: Option<[f32; 3]>) -> Result<Vec3, LookError> {
-    let v = found.ok_or_else(|| LookError::value(place, format!("`{field}` is missing: expected [x, y, z]")))?;
+    let v =
+        found.ok_or_else(|| LookError::value(place, format!("`{field}` is missing: expected [x, y, z]")))?;
     let v = Vec3::from_array(v);
     if v.abs().max_element() <= 1e9 {
         return Ok(v);
@@ -305,7 +311,8 @@ fn vector(place: &str, field: &str, found: Option<[f32; 3]>) -> Result<Vec3, Loo
 }
 
 fn direction(place: &str, what: &str, v: Vec3) -> Result<Vec3, LookError> {
-    v.try_normalize().ok_or_else(|| LookError::value(place, format!("`{what}` has no length, so no direction")))
+    v.try_normalize()
+        .ok_or_else(|| LookError::value(place, format!("`{what}` has no length, so no direction")))
 }
 
 fn number(place: &str, field: &str, found: f32, low: f32, high: f32) -> Result<f32, LookError> {
@@ -336,9 +343,8 @@ fn patch(i: usize, doc: &MaterialDoc) -> Result<MaterialPatch, LookError> {
     let color = |field: &str, c: &Option<Color>| {
         c.as_ref().map(|c| light(&format!("{place}.{field}"), c)).transpose()
     };
-    let bounded = |field: &str, v: Option<f32>, high: f32| {
-        v.map(|v| number(&place, field, v, 0.0, high)).transpose()
-    };
+    let bounded =
+        |field: &str, v: Option<f32>, high: f32| v.map(|v| number(&place, field, v, 0.0, high)).transpose();
     // Alpha may stand in the colour, as in a rig.
     let (mut opaque, mut alpha) = (doc.diffuse, doc.alpha);
     if let Some(c) = opaque.as_mut().filter(|c| c.0.w != 1.0) {

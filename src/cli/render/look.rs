@@ -9,8 +9,8 @@ use sinew::image::develop::Grade;
 use sinew::image::dither::Dither;
 use sinew::image::gamma::Transfer;
 use sinew::image::tone::ToneMap;
-use sinew::io::look_json::{self, LookFile};
 use sinew::io;
+use sinew::io::look_json::{self, LookFile};
 use sinew::render::outline::Outline;
 use sinew::scene::Lighting;
 use std::path::{Path, PathBuf};
@@ -73,7 +73,11 @@ impl LookArgs {
         for patch in &file.materials {
             if !asset.materials.iter().any(|m| patch.matches(&m.name)) {
                 let names: Vec<&str> = asset.materials.iter().map(|m| m.name.as_str()).collect();
-                warn(&format!("--look: no material is called `{}`; there are: {}", patch.name, names.join(", ")));
+                warn(&format!(
+                    "--look: no material is called `{}`; there are: {}",
+                    patch.name,
+                    names.join(", ")
+                ));
             }
         }
         let background = self.background_of(&file);
@@ -120,7 +124,8 @@ impl LookArgs {
             let message = format!("--light {name}: expected studio, sun, flat, asset or a look file (.json)");
             return Err(Failure::Usage(message));
         }
-        let none = || Failure::Input(format!("{name}: the look has neither `light` nor `ambient` nor `lamps`"));
+        let none =
+            || Failure::Input(format!("{name}: the look has neither `light` nor `ambient` nor `lamps`"));
         read(path)?.lighting.ok_or_else(none).map(Some)
     }
 
