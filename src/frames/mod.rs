@@ -1,6 +1,7 @@
 //! Times to pictures: the one place where animation meets rendering.
 
 mod channels;
+mod effects;
 mod fit;
 mod framing;
 mod look;
@@ -10,7 +11,7 @@ mod view;
 mod worker;
 
 pub use framing::{Framing, Turns};
-pub use look::{Look, Shading};
+pub use look::{GroundLook, Look, Shading, Shadows};
 pub use ordered::{Stop, in_order, in_order_pairs};
 pub use view::{FramingDesc, Pivot, View, ViewError};
 pub use worker::Worker;
@@ -18,12 +19,14 @@ pub use worker::Worker;
 use crate::asset::Asset;
 use crate::character::Instance;
 use crate::fk::Posed;
+use crate::image::develop::Developer;
 use crate::image::{Image, Rgba8};
 use crate::render::Settings;
 use crate::render::raster::{IdImage, Stats};
 use crate::scene::{Material, Object, Scene};
 use crate::skin::Deformed;
 use crate::time::{self, Range, Wrap};
+use effects::Stage;
 use fit::Span;
 use glam::DVec3;
 use stand::Stand;
@@ -88,6 +91,9 @@ pub struct Shot<'a> {
     materials: Vec<Material>,
     /// The world point that the scene's frame has its origin at.
     center: DVec3,
+    /// What the look needs beside the scene itself.
+    stage: Option<Stage>,
+    developer: Developer,
 }
 
 /// What a frame cost.
@@ -145,7 +151,9 @@ impl<'a> Shot<'a> {
         let center = asset.character.center(&worker.posed);
         let span = Span { asset, clip: desc.clip, center };
         let stand = Stand::new(&span, &desc.view, desc.framing, aspect, &mut worker)?;
-        Ok(Self { asset, desc, stand, range, materials, center })
+        let stage = Stage::new(&span, &desc.look, &materials, &mut worker);
+        let developer = desc.look.grade.developer();
+        Ok(Self { asset, desc, stand, range, materials, center, stage, developer })
     }
 
     /// What was asked for.
@@ -155,12 +163,26 @@ impl<'a> Shot<'a> {
 
     /// Draw a moment with the buffers of `worker`.
     pub fn draw(&self, moment: impl Into<Moment>, worker: &mut Worker, out: &mut Rgba8) -> FrameStats {
-        self.with_scene(moment.into(), worker, |scene, w| w.draw(scene, &self.desc.settings, out))
+        if self.desc.look.is_direct() {
+            return self
+                .with_scene(moment.into(), worker, |scene, w| w.draw(scene, &self.desc.settings, out));
+        }
+        let mut light = std::mem::take(&mut worker.light);
+        let stats = self.draw_linear(moment, worker, &mut light);
+        self.developer.develop(&light, out);
+        worker.light = light;
+        stats
     }
 
-    /// Draw a moment in linear light, alpha premultiplied.
+    /// Draw a moment in linear light, alpha premultiplied. The look's grade is not applied.
     pub fn draw_linear(&self, moment: impl Into<Moment>, worker: &mut Worker, out: &mut Image) -> FrameStats {
-        self.with_scene(moment.into(), worker, |scene, w| w.draw_linear(scene, &self.desc.settings, out))
+        let mut effects = std::mem::take(&mut worker.effects);
+        let stats = self.with_scene(moment.into(), worker, |scene, w| match &self.stage {
+            Some(stage) => stage.draw(&self.desc, scene, w, &mut effects, out),
+            None => w.draw_linear(scene, &self.desc.settings, out),
+        });
+        worker.effects = effects;
+        stats
     }
 
     /// Which object and triangle is seen at the centre of each pixel of a moment, and how far away.

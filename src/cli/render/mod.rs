@@ -120,7 +120,7 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         wrap: args.time.wrap(args.camera.turntable),
         view: args.camera.view(asset)?,
         framing: args.camera.framing(asset)?,
-        look: args.look.look(asset)?,
+        look: args.look.look(asset, |m| say.warn(m))?,
         settings,
     };
     let start = Instant::now();
@@ -130,7 +130,7 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         shot: &shot,
         frames: &plan.frames,
         rate: args.time.fps,
-        transparent: args.look.transparent(),
+        transparent: look::transparent(&shot.desc().look),
         target: task.target,
         level: args.output.png,
         threads,
