@@ -121,6 +121,7 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         view: args.camera.view(asset)?,
         framing: args.camera.framing(asset)?,
         look: args.look.look(asset, |m| say.warn(m))?,
+        overlays: args.overlay.overlays(asset, args.time.fps)?,
         settings,
     };
     let start = Instant::now();
