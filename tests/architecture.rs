@@ -42,6 +42,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "render",
         ],
     ),
+    ("measure", &["image"]),
     // Frames side by side, wherever they came from: it cuts and copies, and never draws.
     ("sheet", &["time", "image"]),
     // Formats: data rooms only, never frames or render.

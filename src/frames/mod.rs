@@ -2,6 +2,7 @@
 
 mod bones;
 mod channels;
+mod effects;
 mod fit;
 mod framing;
 mod look;
@@ -15,7 +16,7 @@ mod view;
 mod worker;
 
 pub use framing::{Framing, Turns};
-pub use look::{Look, Shading};
+pub use look::{GroundLook, Look, Shading, Shadows};
 pub use ordered::{Stop, in_order, in_order_pairs};
 pub use overlay::{BonesDesc, Onion, Overlays, PathDesc};
 pub use view::{FramingDesc, Pivot, View, ViewError};
@@ -24,12 +25,14 @@ pub use worker::Worker;
 use crate::asset::Asset;
 use crate::character::Instance;
 use crate::fk::Posed;
-use crate::image::{Image, Rgba8, develop::Grade};
+use crate::image::develop::Developer;
+use crate::image::{Image, Rgba8};
 use crate::render::raster::{IdImage, Stats};
 use crate::render::{Settings, Window};
 use crate::scene::{Camera, Material, Object, Scene};
 use crate::skin::Deformed;
 use crate::time::{self, Range, Wrap};
+use effects::Stage;
 use fit::Span;
 use glam::DVec3;
 use overlay::Layers;
@@ -102,6 +105,9 @@ pub struct Shot<'a> {
     materials: Vec<Material>,
     /// The world point that the scene's frame has its origin at.
     center: DVec3,
+    /// What the look needs beside the scene itself.
+    stage: Option<Stage>,
+    developer: Developer,
 }
 
 /// What a frame cost.
@@ -158,8 +164,10 @@ impl<'a> Shot<'a> {
         let center = asset.character.center(&worker.posed);
         let span = Span { asset, clip: desc.clip, center };
         let stand = Stand::new(&span, &desc.view, desc.framing, aspect, &mut worker)?;
+        let stage = Stage::new(&span, &desc.look, &materials, &mut worker);
         let layers = Layers::new(&span, &desc.overlays, &mut worker)?;
-        Ok(Self { asset, desc, stand, layers, range, materials, center })
+        let developer = desc.look.grade.developer();
+        Ok(Self { asset, desc, stand, range, materials, center, stage, layers, developer })
     }
 
     /// What was asked for.
@@ -169,31 +177,44 @@ impl<'a> Shot<'a> {
 
     /// Pixels a row, and rows, of its pictures.
     pub fn size(&self) -> [usize; 2] {
-        let Settings { width, height, .. } = self.desc.settings;
-        let whole = Window { x: 0, y: 0, width, height };
-        let part = self.desc.crop.unwrap_or(whole).within(width, height);
+        let part = self.part(self.desc.crop);
         [part.width, part.height]
+    }
+
+    /// What of a window is in the picture; all of it for `None`.
+    fn part(&self, window: Option<Window>) -> Window {
+        let Settings { width, height, .. } = self.desc.settings;
+        window.unwrap_or(Window { x: 0, y: 0, width, height }).within(width, height)
     }
 
     /// Draw a moment with the buffers of `worker`.
     pub fn draw(&self, moment: impl Into<Moment>, worker: &mut Worker, out: &mut Rgba8) -> FrameStats {
-        if self.desc.overlays.is_empty() {
+        if self.desc.look.is_direct() && self.desc.overlays.is_empty() {
             return self
                 .with_scene(moment.into(), worker, |scene, w| w.draw(scene, &self.desc.settings, out));
         }
-        let mut canvas = std::mem::take(&mut worker.canvas);
-        let stats = self.draw_layers(moment.into(), worker, &mut canvas);
-        Grade::default().develop(&canvas, out);
-        worker.canvas = canvas;
+        // What a grade makes of a pixel may depend on its neighbours and on its place.
+        let window = self.desc.crop.filter(|_| self.desc.look.is_direct());
+        let mut light = std::mem::take(&mut worker.light);
+        let stats = self.draw_layers(moment.into(), worker, window, &mut light);
+        self.developer.develop(&light, out);
+        worker.light = light;
+        if window != self.desc.crop {
+            self.part(self.desc.crop).cut(4, out.width, &mut out.data);
+            [out.width, out.height] = self.size();
+        }
         stats
     }
 
-    /// Draw a moment in linear light, alpha premultiplied.
+    /// Draw a moment in linear light, alpha premultiplied. The look's grade is not applied.
     pub fn draw_linear(&self, moment: impl Into<Moment>, worker: &mut Worker, out: &mut Image) -> FrameStats {
-        if !self.desc.overlays.is_empty() {
-            return self.draw_layers(moment.into(), worker, out);
+        let window = self.desc.crop.filter(|_| self.stage.is_none());
+        let stats = self.draw_layers(moment.into(), worker, window, out);
+        if window != self.desc.crop {
+            self.part(self.desc.crop).cut(1, out.width, &mut out.pixels);
+            [out.width, out.height] = self.size();
         }
-        self.with_scene(moment.into(), worker, |scene, w| w.draw_linear(scene, &self.desc.settings, out))
+        stats
     }
 
     /// Which object and triangle is seen at the centre of each pixel of a moment, and how far away.

@@ -12,8 +12,10 @@ use super::view::ViewError;
 use super::{FrameStats, Moment, Shot, Worker};
 use crate::image::Image;
 use crate::image::composite::Operator;
+use crate::render::Window;
 use crate::scene::Camera;
 use crate::skeleton::BoneId;
+use std::time::Instant;
 
 /// What is drawn with a character. The default is nothing, and costs nothing.
 #[derive(Clone, Debug, PartialEq)]
@@ -140,20 +142,30 @@ fn check(span: &Span, overlays: &Overlays) -> Result<(), ViewError> {
 }
 
 impl Shot<'_> {
-    /// Draw a moment with its overlays.
-    pub(super) fn draw_layers(&self, moment: Moment, worker: &mut Worker, out: &mut Image) -> FrameStats {
+    /// Draw a window of a moment with its overlays.
+    pub(super) fn draw_layers(
+        &self,
+        moment: Moment,
+        worker: &mut Worker,
+        window: Option<Window>,
+        out: &mut Image,
+    ) -> FrameStats {
         let overlays = &self.desc.overlays;
         let mut layer = std::mem::take(&mut worker.layer);
         let mut stats = FrameStats::default();
         self.pose(moment.time, worker, &mut stats);
         let camera = self.stand.camera(moment, &worker.posed, &worker.deformed);
 
-        worker.rasterizer.set_window(self.desc.crop);
+        worker.rasterizer.set_window(window);
         let whole = overlays.onion.is_none() && overlays.xray.is_none();
-        if whole {
-            self.character(&camera, self.desc.look.background, worker, out, &mut stats);
+        let background = self.desc.look.background;
+        if whole && self.stage.is_none() {
+            self.character(&camera, background, worker, out, &mut stats);
+        } else if whole {
+            self.character(&camera, [0.0; 4], worker, out, &mut stats);
+            self.put_behind(&camera, worker, out);
         } else {
-            self.clear(out);
+            self.clear(window, out);
             if let Some(o) = &overlays.onion {
                 onion::ghosts(self, o, moment.time, &camera, worker, out, &mut stats);
                 self.pose(moment.time, worker, &mut stats);
@@ -163,27 +175,37 @@ impl Shot<'_> {
             }
             self.character(&camera, [0.0; 4], worker, &mut layer, &mut stats);
             Operator::OVER.apply(&layer, overlays.xray.unwrap_or(1.0), out);
-            let background = self.desc.look.background;
-            out.pixels.iter_mut().for_each(|p| *p = Operator::OVER.pixel(*p, background));
+            self.put_behind(&camera, worker, out);
         }
         if overlays.xray.is_none() {
             self.bones(&camera, worker, &mut layer, out, &mut stats);
         }
+        let corner = window.map_or([0, 0], |w| [w.x, w.y]);
         for trail in &self.layers.trails {
-            trail.draw(self, moment.time, &camera, &worker.posed, &mut layer, out);
+            trail.draw(self, moment.time, &camera, &worker.posed, [&mut layer, out], corner);
         }
         worker.layer = layer;
         stats
     }
 
-    /// An empty picture of the shot's size.
-    fn clear(&self, out: &mut Image) {
-        [out.width, out.height] = self.size();
+    /// An empty picture of a window's size.
+    fn clear(&self, window: Option<Window>, out: &mut Image) {
+        let part = self.part(window);
+        (out.width, out.height) = (part.width, part.height);
         out.pixels.clear();
         out.pixels.resize(out.width * out.height, [0.0; 4]);
     }
 
-    /// The character as it is posed, before a colour.
+    /// Put the look's background, and its ground if it has one, behind a picture.
+    fn put_behind(&self, camera: &Camera, worker: &Worker, out: &mut Image) {
+        let background = self.desc.look.background;
+        match &self.stage {
+            Some(stage) => stage.put_behind(&self.desc.look, camera, &worker.effects, out),
+            None => out.pixels.iter_mut().for_each(|p| *p = Operator::OVER.pixel(*p, background)),
+        }
+    }
+
+    /// The character as it is posed, before a colour; a look with effects of its own takes none.
     pub(super) fn character(
         &self,
         camera: &Camera,
@@ -192,9 +214,15 @@ impl Shot<'_> {
         out: &mut Image,
         stats: &mut FrameStats,
     ) {
+        let start = Instant::now();
         let mut scene = self.scene(*camera, &worker.posed, &worker.deformed);
         scene.background = background;
-        stats.raster += worker.rasterizer.draw_linear(&scene, &self.desc.settings, out);
+        let (rasterizer, effects) = (&mut worker.rasterizer, &mut worker.effects);
+        stats.raster += match &self.stage {
+            Some(stage) => stage.draw(&self.desc, &scene, rasterizer, effects, out),
+            None => rasterizer.draw_linear(&scene, &self.desc.settings, out),
+        };
+        stats.times.draw += start.elapsed();
     }
 
     /// The skeleton as it is posed, on a picture.

@@ -66,17 +66,16 @@ impl Trail {
         Self { desc: *desc, places, keys, range }
     }
 
-    /// Draw the path on a picture, as it is seen at a time.
+    /// Draw the path on a picture that begins at pixel `corner` of the whole, as it is seen at a time.
     pub fn draw(
         &self,
         shot: &Shot,
         time: f64,
         camera: &Camera,
         posed: &Posed,
-        layer: &mut Image,
-        out: &mut Image,
+        [layer, out]: [&mut Image; 2],
+        corner: [usize; 2],
     ) {
-        let corner = shot.desc.crop.map_or([0, 0], |c| [c.x, c.y]);
         let lens = Lens::new(camera, shot.aspect(), &shot.desc);
         let now = wrap(time, self.range, shot.desc.wrap);
         let width = f64::from(self.desc.width_px);

@@ -1,5 +1,6 @@
 //! What one thread works with.
 
+use super::effects::Effects;
 use crate::asset::Asset;
 use crate::character::Scratch;
 use crate::fk::{self, Posed};
@@ -17,8 +18,9 @@ pub struct Worker {
     pub(super) scratch: Scratch,
     pub(super) deformed: Vec<Deformed>,
     pub(super) rasterizer: Rasterizer,
-    /// Pictures in linear light, where one is put together from layers.
-    pub(super) canvas: Image,
+    pub(super) effects: Effects,
+    /// A picture on its way to 8 bits, and one that is put on it.
+    pub(super) light: Image,
     pub(super) layer: Image,
 }
 

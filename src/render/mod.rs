@@ -1,9 +1,13 @@
 //! Scenes to pictures.
 
+pub mod backdrop;
 pub mod channel;
+pub mod footprint;
 mod material;
+pub mod outline;
 mod sample;
 mod shade;
+pub mod shadow;
 mod styled;
 
 // A loop that counts lanes is what becomes one vector instruction; iterators do not always.
@@ -67,6 +71,15 @@ impl Window {
     pub fn within(self, width: usize, height: usize) -> Self {
         let (x, y) = (self.x.min(width), self.y.min(height));
         Self { x, y, width: self.width.min(width - x), height: self.height.min(height - y) }
+    }
+
+    /// Leave of a list with `n` entries a pixel, in rows of `columns` pixels, those of the window.
+    pub(crate) fn cut<T: Copy>(self, n: usize, columns: usize, list: &mut Vec<T>) {
+        for row in 0..self.height {
+            let from = n * ((self.y + row) * columns + self.x);
+            list.copy_within(from..from + n * self.width, n * row * self.width);
+        }
+        list.truncate(n * self.width * self.height);
     }
 }
 

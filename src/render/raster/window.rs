@@ -43,10 +43,6 @@ impl View {
         if w == t || list.is_empty() {
             return;
         }
-        for row in 0..w.height {
-            let from = n * ((w.y - t.y + row) * t.width + w.x - t.x);
-            list.copy_within(from..from + n * w.width, n * row * w.width);
-        }
-        list.truncate(n * w.width * w.height);
+        Window { x: w.x - t.x, y: w.y - t.y, ..w }.cut(n, t.width, list);
     }
 }
