@@ -4,6 +4,7 @@ mod channels;
 mod fit;
 mod look;
 mod ordered;
+mod pivot;
 mod view;
 mod worker;
 
@@ -128,6 +129,17 @@ impl<'a> Shot<'a> {
     /// What was asked for.
     pub fn desc(&self) -> &ShotDesc {
         &self.desc
+    }
+
+    /// Seconds of the clip.
+    pub fn range(&self) -> Range {
+        self.range
+    }
+
+    /// Names of the objects that pixels may show, in order: those of the meshes that the character's instances wear.
+    pub fn object_names(&self) -> Vec<String> {
+        let character = &self.asset.character;
+        character.instances().iter().map(|i| character.mesh(i).name.clone()).collect()
     }
 
     /// Draw a moment with the buffers of `worker`.

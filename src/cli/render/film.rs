@@ -5,8 +5,8 @@ use crate::cli::{Failure, say::Say};
 use sinew::frames::{FrameStats, Shot, Stop, Worker, in_order};
 use sinew::image::Rgba8;
 use sinew::io::picture::{
-    self, ApngWriter, AtomicFile, Film, Folder, Format, GifWriter, Mapper, Palette, PngLevel, Target,
-    choose_dither, encode_png,
+    self, ApngWriter, AtomicFile, Dither, Film, Folder, Format, GifWriter, Mapper, Palette, PixelArt,
+    PngLevel, Target, choose_dither, encode_indexed_png, encode_png,
 };
 use sinew::time::Rate;
 use std::path::Path;
@@ -25,6 +25,30 @@ pub struct Job<'a> {
     pub level: PngLevel,
     pub threads: usize,
     pub force: bool,
+    /// Frames become pixel art; they are drawn before nothing then.
+    pub art: Option<&'a PixelArt>,
+    /// Pixels of a finished frame for each one that is drawn, across and down.
+    pub scale: usize,
+}
+
+impl Job<'_> {
+    /// Pixels of a finished frame.
+    pub fn size(&self) -> [usize; 2] {
+        let settings = &self.shot.desc().settings;
+        [settings.width * self.scale, settings.height * self.scale]
+    }
+
+    fn mapper(&self) -> Option<Mapper> {
+        self.art.map(PixelArt::mapper)
+    }
+
+    /// A frame as it is shown.
+    fn finish(&self, mapper: &mut Option<Mapper>, picture: Rgba8) -> Rgba8 {
+        match (self.art, mapper) {
+            (Some(art), Some(mapper)) => art.finish(mapper, &picture).to_rgba8(art.palette()),
+            _ => picture,
+        }
+    }
 }
 
 pub fn write(job: &Job, say: &Say) -> Result<(), Failure> {
@@ -114,8 +138,11 @@ fn stills(job: &Job, say: &Say) -> Result<FrameStats, Failure> {
     let stats = draw(
         job,
         job.frames,
-        || (),
-        |(), picture| encode_png(&picture, job.level),
+        || job.mapper(),
+        |mapper, picture| match (job.art, mapper) {
+            (Some(art), Some(m)) => encode_indexed_png(&art.finish(m, &picture), art.palette(), job.level),
+            _ => encode_png(&picture, job.level),
+        },
         |i, png| {
             let path = job.target.path_of(job.frames[i].number);
             AtomicFile::write(path, &png?, job.force, folder)?;
@@ -129,7 +156,7 @@ fn stills(job: &Job, say: &Say) -> Result<FrameStats, Failure> {
 
 fn film(job: &Job) -> Film {
     Film {
-        size: [job.shot.desc().settings.width, job.shot.desc().settings.height],
+        size: job.size(),
         frames: job.frames.len() as u32,
         rate: job.rate,
         plays: 0,
@@ -145,8 +172,8 @@ fn apng(job: &Job, path: &Path, say: &Say) -> Result<FrameStats, Failure> {
     let stats = draw(
         job,
         job.frames,
-        || (),
-        |(), picture| picture,
+        || job.mapper(),
+        |mapper, picture| job.finish(mapper, picture),
         |_, picture| {
             bar.inc(1);
             writer.write(&picture)
@@ -162,37 +189,20 @@ fn gif(job: &Job, path: &Path, say: &Say) -> Result<FrameStats, Failure> {
     let film = film(job);
     let mut file = AtomicFile::create(path, job.force, Folder::MustExist).map_err(failed)?;
 
-    // A few frames, spread over the film, decide on its colours and its dithering.
-    let n = job.frames.len();
-    let few = n.min(PALETTE_FRAMES);
-    let spread: Vec<Frame> = (0..few).map(|k| job.frames[k * n / few]).collect();
-    let mut samples = Vec::with_capacity(few);
-    draw(
-        job,
-        &spread,
-        || (),
-        |(), picture| picture,
-        |_, picture| {
-            samples.push(picture);
-            Ok(())
-        },
-    )?;
-    let palette = Palette::from_frames(&samples, 256, &film);
-    let (dither, scores) = choose_dither(&samples, &palette, &film);
-    drop(samples);
-    for s in scores {
-        let chosen = if s.dither == dither { ", chosen" } else { "" };
-        let name = s.dither.name();
-        say.detail(&format!("dithering {name}: error {:.3}, flicker {:.3}{chosen}", s.error, s.flicker));
-    }
-
+    let (palette, dither) = match job.art {
+        Some(art) => (art.palette().clone(), Dither::None),
+        None => film_palette(job, &film, say)?,
+    };
     let mut writer = GifWriter::new(&mut file, film, &palette, dither).map_err(failed)?;
-    let bar = say.progress(n);
+    let bar = say.progress(job.frames.len());
     let stats = draw(
         job,
         job.frames,
-        || Mapper::new(&palette, &film),
-        |mapper, picture| mapper.map(&picture, dither),
+        || job.mapper().unwrap_or_else(|| Mapper::new(&palette, &film)),
+        |mapper, picture| match job.art {
+            Some(art) => art.finish(mapper, &picture),
+            None => mapper.map(&picture, dither),
+        },
         |_, indexed| {
             bar.inc(1);
             writer.write_indexed(indexed)
@@ -208,4 +218,33 @@ fn gif(job: &Job, path: &Path, say: &Say) -> Result<FrameStats, Failure> {
     }
     file.commit().map_err(failed)?;
     Ok(stats)
+}
+
+/// The colours and the dithering that suit a film best.
+fn film_palette(job: &Job, film: &Film, say: &Say) -> Result<(Palette, Dither), Failure> {
+    // A few frames, spread over the film, decide on its colours and its dithering.
+    let n = job.frames.len();
+    let few = n.min(PALETTE_FRAMES);
+    let spread: Vec<Frame> = (0..few).map(|k| job.frames[k * n / few]).collect();
+    let mut samples = Vec::with_capacity(few);
+    draw(
+        job,
+        &spread,
+        || (),
+        |(), picture| picture,
+        |_, picture| {
+            samples.push(picture);
+            Ok(())
+        },
+    )?;
+    let palette = Palette::from_frames(&samples, 256, film);
+    let (dither, scores) = choose_dither(&samples, &palette, film);
+    drop(samples);
+    for s in scores {
+        let chosen = if s.dither == dither { ", chosen" } else { "" };
+        let name = s.dither.name();
+        say.detail(&format!("dithering {name}: error {:.3}, flicker {:.3}{chosen}", s.error, s.flicker));
+    }
+
+    Ok((palette, dither))
 }

@@ -26,6 +26,10 @@ Examples:
   sinew render fox.glb -o run.####.png --clip Run --fps 30 --background transparent
   sinew render fox.glb -o part.%04d.png --frames 1-48x2,60
   sinew render fox.glb -o side.apng --camera yaw=90,pitch=5,fov=20
+  sinew render rigs/pip.json -o pip-sheet.png --sheet trimmed --directions 8 --camera yaw=0,pitch=30,fov=0 --size 128 --fps 12
+  sinew render fox.glb -o fox-sheet.png --sheet grid --maps normal,depth,id --sheet-json aseprite --size 128
+  sinew render fox.glb -o fox.gif --pixel-art --pixel-scale 4 --size 256 --colors 16 --outline
+  sinew render fox.glb -o fox-contact.png --contact 6x4 --size 160
   sinew render fox.glb --list
 
 Frames are numbered from 1; frame 1 shows 0 s, or the clip's first key if that is earlier. The camera orbits the character and stands where all of it is
@@ -58,7 +62,7 @@ pub struct Args {
 pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     let usage = |e: &dyn std::fmt::Display| Failure::Usage(e.to_string());
     let target = args.output.target()?;
-    let settings = args.output.settings()?;
+    let settings = args.sheet.settings(args.output.settings()?)?;
     let threads = args.output.threads();
 
     let options = Options { textures: target.is_some() };
@@ -66,10 +70,14 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     let asset = &import.asset;
     let Some(target) = target.filter(|_| !args.list) else { return list(asset) };
     keep_inputs(args, &target)?;
+    let one_picture = args.sheet.is_one_picture();
     let clip = args.time.clip(&import)?;
     let range = clip.map_or(Range::default(), |c| asset.character.clips()[c].playback());
-    let frames = args.time.frames(&args.input, range, matches!(target, Target::Still(_)))?;
-    target.check_frames(frames.len()).map_err(|e| usage(&e))?;
+    let alone = matches!(target, Target::Still(_)) && !one_picture;
+    let mut frames = args.time.frames(&args.input, range, alone)?;
+    if !one_picture {
+        target.check_frames(frames.len()).map_err(|e| usage(&e))?;
+    }
 
     let character = &asset.character;
     if character.instances().iter().all(|i| character.mesh(i).triangles.is_empty()) {
@@ -77,34 +85,47 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     }
 
     // One picture is drawn by all threads, many by one thread each.
-    let settings = Settings { threads: if frames.len() == 1 { threads } else { 1 }, ..settings };
-    let desc = ShotDesc {
-        clip,
-        wrap: args.time.wrap,
-        view: args.camera.view(asset)?,
-        look: args.look.look(asset)?,
-        settings,
-    };
+    let settings =
+        Settings { threads: if frames.len() == 1 && !one_picture { threads } else { 1 }, ..settings };
+    let mut look = args.look.look(asset)?;
+    let background = if args.sheet.is_transparent() { [0.0; 4] } else { look.background };
+    if args.sheet.clears_background() {
+        look.background = [0.0; 4];
+    }
+    let desc = ShotDesc { clip, wrap: args.time.wrap, view: args.camera.view(asset)?, look, settings };
     let shot = Shot::new(asset, desc).map_err(|e| usage(&e))?;
-    let job = Job {
+    if let Some(moments) = args.sheet.contact_frames(&shot) {
+        frames = moments;
+    }
+    let mut job = Job {
         shot: &shot,
         frames: &frames,
         rate: args.time.fps,
-        transparent: args.look.transparent(),
+        transparent: args.look.transparent() || args.sheet.is_transparent(),
         target: &target,
         level: args.output.png,
         threads,
         force: args.output.force,
+        art: None,
+        scale: args.sheet.pixels.scale(),
     };
+    let art = args.sheet.pixels.art(&job, background, say)?;
+    job.art = art.as_ref();
+    if one_picture {
+        let name = clip.map_or("rest", |c| asset.character.clips()[c].name.as_str());
+        return args.sheet.write(&job, name, art.as_ref(), say);
+    }
     film::write(&job, say)
 }
 
 /// Refuse to write over what is being read, `--force` or not.
 fn keep_inputs(args: &Args, target: &Target) -> Result<(), Failure> {
-    let Ok(output) = target.path_of(1).canonicalize() else { return Ok(()) };
-    for input in [Some(&args.input), args.time.poses.as_ref()].into_iter().flatten() {
-        if input.canonicalize().is_ok_and(|i| i == output) {
-            let message = format!("-o {}: this is the input; choose another name", input.display());
+    let inputs = || [Some(&args.input), args.time.poses.as_ref()].into_iter().flatten();
+    for output in args.sheet.companions(target).into_iter().chain([target.path_of(1)]) {
+        let Ok(written) = output.canonicalize() else { continue };
+        if let Some(input) = inputs().find(|i| i.canonicalize().is_ok_and(|i| i == written)) {
+            let message =
+                format!("-o {}: {} is the input; choose another name", output.display(), input.display());
             return Err(Failure::Usage(message));
         }
     }
