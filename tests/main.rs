@@ -2,6 +2,8 @@
 
 mod architecture;
 #[cfg(feature = "cli")]
+mod batch;
+#[cfg(feature = "cli")]
 mod cli;
 #[cfg(all(feature = "io", feature = "pictures"))]
 mod corpus;

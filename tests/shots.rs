@@ -25,7 +25,7 @@ fn rigs() -> Vec<(String, Import)> {
 
 /// A shot of a clip before a colour.
 fn shot(import: &Import, clip: usize, background: [f32; 4], settings: Settings) -> Shot<'_> {
-    let look = Look { background };
+    let look = Look { background, ..Default::default() };
     let desc = ShotDesc { clip: Some(clip), view: VIEW, look, settings, ..Default::default() };
     Shot::new(&import.asset, desc).unwrap()
 }

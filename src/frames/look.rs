@@ -1,34 +1,102 @@
-//! How a shot looks: its light and what lies behind it.
+//! How a shot looks: its light, how light becomes colour, and what lies behind.
 
-use crate::asset::MountedLight;
+use crate::asset::{Asset, MountedLight};
 use crate::fk::Posed;
-use crate::scene::{Camera, Light, LightKind};
+use crate::scene::{Camera, Lamp, Light, LightKind, Lighting, Material, MaterialPatch, Style};
 use glam::{Affine3A, DVec3, Vec3};
 
+/// How surfaces are shaded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Shading {
+    /// By interpolated normals.
+    #[default]
+    Smooth,
+    /// In so many tones, from 2 on, with hard highlights (see [`Style::toon`]).
+    Toon(u32),
+    /// Each triangle by its own normal.
+    Facets,
+}
+
 /// What a shot has of its own beside the asset's materials.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Default)]
 pub struct Look {
     /// Linear RGBA behind everything, alpha premultiplied.
     pub background: [f32; 4],
+    /// All light; `None` is the asset's lamps, or a key and a fill light that stand with the camera where it has none.
+    pub lighting: Option<Lighting>,
+    /// How surfaces are shaded.
+    pub shading: Shading,
+    /// Changes of the asset's materials, in order.
+    pub materials: Vec<MaterialPatch>,
 }
 
-impl Default for Look {
-    /// Nothing behind the character.
-    fn default() -> Self {
-        Self { background: [0.0; 4] }
+impl Look {
+    /// Steps of the tone ramp.
+    pub(super) fn tones(&self) -> Option<u32> {
+        match self.shading {
+            Shading::Toon(steps) => Some(steps),
+            _ => None,
+        }
     }
 }
 
-/// The asset's lamps under a faint sky, or a key and a fill light that stand with the camera.
+/// The asset's materials as the look has them, and the one that meshes without a material wear.
+pub(super) fn materials(asset: &Asset, look: &Look) -> Vec<Material> {
+    let mut materials = asset.materials.clone();
+    materials.push(Material::default());
+    for m in &mut materials {
+        for patch in &look.materials {
+            if patch.matches(&m.name) {
+                patch.apply(m);
+            }
+        }
+        // Light from everywhere alike is not to be darkened in corners.
+        if look.lighting.as_ref().is_some_and(Lighting::is_flat) {
+            m.occlusion_map = None;
+        }
+    }
+    materials
+}
+
+/// Light of one moment, in the scene's frame.
+pub(super) struct Lit {
+    pub ambient: Vec3,
+    pub style: Style<'static>,
+    pub lights: Vec<Light>,
+}
+
+/// The light that the look asks for, at one moment.
 pub(super) fn lights(
+    look: &Look,
     mounted: &[MountedLight],
     posed: &Posed,
     center: DVec3,
     camera: &Camera,
-) -> (Vec3, Vec<Light>) {
+) -> Lit {
+    let toon = look.tones();
+    let Some(lighting) = &look.lighting else {
+        let (ambient, lights) = of_asset(mounted, posed, center, camera);
+        return Lit { ambient, style: Style { toon, ..Style::default() }, lights };
+    };
+    let below = (lighting.below != lighting.above).then_some(lighting.below);
+    Lit {
+        ambient: lighting.above,
+        style: Style { below, toon, ..Style::default() },
+        lights: lighting.lamps.iter().map(|l| placed(l, center, camera)).collect(),
+    }
+}
+
+/// A lamp in the scene's frame.
+fn placed(lamp: &Lamp, center: DVec3, camera: &Camera) -> Light {
+    let frame = Affine3A::from_mat3_translation(lamp.stand.axes(camera), -center.as_vec3());
+    lamp.light.carried(&frame)
+}
+
+/// The asset's lamps under a faint sky, or a key and a fill light that stand with the camera.
+fn of_asset(mounted: &[MountedLight], posed: &Posed, center: DVec3, camera: &Camera) -> (Vec3, Vec<Light>) {
     if !mounted.is_empty() {
-        let carried = mounted.iter().map(|m| carry(&m.light, &posed.near(m.bone, center)));
-        return (Vec3::splat(0.08), carried.collect());
+        let lamps = mounted.iter().map(|m| m.light.carried(&posed.near(m.bone, center)));
+        return (Vec3::splat(0.08), lamps.collect());
     }
     let lamp = |from: Vec3, color: Vec3| {
         let direction = -camera.scene_from_view.transform_vector3(from.normalize());
@@ -37,19 +105,4 @@ pub(super) fn lights(
     let key = lamp(Vec3::new(-0.55, 0.75, 0.65), Vec3::new(0.92, 0.9, 0.86));
     let fill = lamp(Vec3::new(0.9, 0.15, 0.5), Vec3::new(0.2, 0.22, 0.26));
     (Vec3::new(0.25, 0.26, 0.28), vec![key, fill])
-}
-
-/// A lamp in the frame of a bone, in the scene's frame.
-fn carry(light: &Light, scene_from_bone: &Affine3A) -> Light {
-    let turn = |d: Vec3| scene_from_bone.transform_vector3(d).normalize_or(Vec3::NEG_Z);
-    let mut light = *light;
-    match &mut light.kind {
-        LightKind::Directional { direction } => *direction = turn(*direction),
-        LightKind::Point { position, .. } => *position = scene_from_bone.transform_point3(*position),
-        LightKind::Spot { position, direction, .. } => {
-            *position = scene_from_bone.transform_point3(*position);
-            *direction = turn(*direction);
-        }
-    }
-    light
 }

@@ -2,15 +2,19 @@
 
 mod channels;
 mod fit;
+mod framing;
 mod look;
 mod ordered;
 mod pivot;
+mod stand;
 mod view;
 mod worker;
 
-pub use look::Look;
+pub use framing::{Framing, Turns};
+pub use look::{Look, Shading};
 pub use ordered::{Stop, in_order};
-pub use view::{Framing, View, ViewError};
+pub use pivot::ground_point;
+pub use view::{FramingDesc, Pivot, View, ViewError};
 pub use worker::Worker;
 
 use crate::asset::Asset;
@@ -19,10 +23,13 @@ use crate::fk::Posed;
 use crate::image::{Image, Rgba8};
 use crate::render::Settings;
 use crate::render::raster::{IdImage, Stats};
-use crate::scene::{Camera, Material, Object, Scene};
+use crate::scene::{Material, Object, Scene};
 use crate::skin::Deformed;
 use crate::time::{self, Range, Wrap};
-use glam::{Affine3A, DVec3};
+use fit::Span;
+use glam::DVec3;
+use stand::Stand;
+use std::time::{Duration, Instant};
 
 /// What is filmed, from where, and how it looks.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,6 +40,8 @@ pub struct ShotDesc {
     pub wrap: Wrap,
     /// Which camera.
     pub view: View,
+    /// How it holds the character in its picture.
+    pub framing: FramingDesc,
     /// Light and background.
     pub look: Look,
     /// Size and samples of the pictures.
@@ -46,6 +55,7 @@ impl Default for ShotDesc {
             clip: None,
             wrap: Wrap::Clamp,
             view: View::default(),
+            framing: FramingDesc::default(),
             look: Look::default(),
             settings: Settings::default(),
         }
@@ -57,7 +67,8 @@ impl Default for ShotDesc {
 pub struct Moment {
     /// Seconds in the clip.
     pub time: f64,
-    /// Radians by which an orbiting camera has walked on, its lights with it: turntables and sheets of directions.
+    /// Radians by which an orbiting camera has walked on, its lights with it: turntables and sheets of directions. What it walks
+    /// around says [`FramingDesc::pivot`].
     pub turn: f32,
 }
 
@@ -73,7 +84,7 @@ impl From<f64> for Moment {
 pub struct Shot<'a> {
     asset: &'a Asset,
     desc: ShotDesc,
-    orbit: Camera,
+    stand: Stand<'a>,
     range: Range,
     /// The asset's materials, and the one that meshes without a material wear.
     materials: Vec<Material>,
@@ -82,7 +93,7 @@ pub struct Shot<'a> {
 }
 
 /// What a frame cost.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct FrameStats {
     /// Bones evaluated.
     pub bones: usize,
@@ -90,6 +101,30 @@ pub struct FrameStats {
     pub vertices: usize,
     /// What the rasterizer counted.
     pub raster: Stats,
+    /// Where the time went.
+    pub times: Times,
+}
+
+/// Time a stage, by the wall's clock.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Times {
+    /// Sampling the clip and forward kinematics.
+    pub pose: Duration,
+    /// Morphing and skinning.
+    pub deform: Duration,
+    /// Scene to pixels.
+    pub draw: Duration,
+}
+
+impl std::ops::AddAssign for FrameStats {
+    fn add_assign(&mut self, o: Self) {
+        self.bones += o.bones;
+        self.vertices += o.vertices;
+        self.raster += o.raster;
+        self.times.pose += o.times.pose;
+        self.times.deform += o.times.deform;
+        self.times.draw += o.times.draw;
+    }
 }
 
 impl<'a> Shot<'a> {
@@ -98,32 +133,21 @@ impl<'a> Shot<'a> {
     /// more than [`Framing::VERTICES`] vertices in all. Which frames are drawn later makes no difference.
     ///
     /// # Errors
-    /// [`ViewError`] if the asset has no such camera.
+    /// [`ViewError`] if the asset has no such camera or bone, or if the view leaves no picture plane.
     ///
     /// # Panics
     /// If the asset has no such clip.
     pub fn new(asset: &'a Asset, desc: ShotDesc) -> Result<Self, ViewError> {
-        let mut materials = asset.materials.clone();
-        materials.push(Material::default());
+        let materials = look::materials(asset, &desc.look);
         let settings = &desc.settings;
         let aspect = settings.width as f32 / settings.height.max(1) as f32;
         let range = desc.clip.map(|c| asset.character.clips()[c].playback()).unwrap_or_default();
         let mut worker = Worker::default();
         worker.evaluate(asset, desc.clip, range.start);
         let center = asset.character.center(&worker.posed);
-        let framing = match desc.view {
-            View::Orbit { yaw, pitch, fov_y } => {
-                let mut framing = Framing::new(yaw, pitch, fov_y, aspect);
-                fit::fit(asset, desc.clip, center, &mut worker, &mut framing);
-                framing
-            }
-            View::Mounted(camera) if camera >= asset.cameras.len() => {
-                return Err(ViewError { camera, count: asset.cameras.len() });
-            }
-            View::Mounted(_) => Framing::new(0.0, 0.0, 1.0, aspect),
-        };
-        let orbit = framing.camera();
-        Ok(Self { asset, desc, orbit, range, materials, center })
+        let span = Span { asset, clip: desc.clip, center };
+        let stand = Stand::new(&span, &desc.view, desc.framing, aspect, &mut worker)?;
+        Ok(Self { asset, desc, stand, range, materials, center })
     }
 
     /// What was asked for.
@@ -134,6 +158,11 @@ impl<'a> Shot<'a> {
     /// Seconds of the clip.
     pub fn range(&self) -> Range {
         self.range
+    }
+
+    /// Where the character stands in the world over the shot's clip: [`ground_point`].
+    pub fn ground_point(&self) -> DVec3 {
+        ground_point(self.asset, self.desc.clip)
     }
 
     /// Names of the objects that pixels may show, in order: those of the meshes that the character's instances wear.
@@ -166,12 +195,16 @@ impl<'a> Shot<'a> {
         worker: &mut Worker,
         draw: impl FnOnce(&Scene, &mut crate::render::raster::Rasterizer) -> Stats,
     ) -> FrameStats {
+        let start = Instant::now();
         worker.evaluate(self.asset, self.desc.clip, time::wrap(moment.time, self.range, self.desc.wrap));
+        let posed = Instant::now();
         worker.deform(self.asset, self.center);
+        let deformed = Instant::now();
         let scene = self.scene(moment, &worker.posed, &worker.deformed);
         let raster = draw(&scene, &mut worker.rasterizer);
         let vertices = worker.deformed.iter().map(|d| d.positions.len()).sum();
-        FrameStats { bones: worker.posed.len(), vertices, raster }
+        let times = Times { pose: posed - start, deform: deformed - posed, draw: deformed.elapsed() };
+        FrameStats { bones: worker.posed.len(), vertices, raster, times }
     }
 
     fn scene<'s>(&'s self, moment: Moment, posed: &Posed, deformed: &'s [Deformed]) -> Scene<'s> {
@@ -183,44 +216,24 @@ impl<'a> Shot<'a> {
             Object {
                 mesh,
                 positions: &d.positions,
-                normals: &d.normals,
+                normals: if self.desc.look.shading == Shading::Facets { &[] } else { &d.normals },
                 tangents: &d.tangents,
                 material,
                 mirrored: d.mirrored,
             }
         };
-        let camera = self.camera(moment, posed);
-        let (ambient, lights) = look::lights(&self.asset.lights, posed, self.center, &camera);
+        let camera = self.stand.camera(moment, posed, deformed);
+        let look = &self.desc.look;
+        let lit = look::lights(look, &self.asset.lights, posed, self.center, &camera);
         Scene {
             camera,
-            ambient,
-            lights,
-            background: self.desc.look.background,
+            ambient: lit.ambient,
+            lights: lit.lights,
+            style: lit.style,
+            background: look.background,
             objects: character.instances().iter().zip(deformed).map(object).collect(),
             materials: &self.materials,
             textures: &self.asset.textures,
         }
     }
-
-    fn camera(&self, moment: Moment, posed: &Posed) -> Camera {
-        let View::Mounted(index) = self.desc.view else { return turned(self.orbit, moment.turn) };
-        let mounted = &self.asset.cameras[index];
-        // A scaled bone carries its camera, but does not distort it.
-        let (_, rotation, translation) =
-            posed.near(mounted.bone, self.center).to_scale_rotation_translation();
-        Camera {
-            scene_from_view: Affine3A::from_rotation_translation(rotation, translation),
-            projection: mounted.projection,
-            near: mounted.near,
-            far: mounted.near * 1e6,
-        }
-    }
-}
-
-/// The camera after a walk of `turn` radians around the vertical axis of the scene's origin.
-fn turned(camera: Camera, turn: f32) -> Camera {
-    if turn == 0.0 {
-        return camera;
-    }
-    Camera { scene_from_view: Affine3A::from_rotation_y(turn) * camera.scene_from_view, ..camera }
 }

@@ -1,41 +1,48 @@
 //! Where the character stands in its pictures, and whether its clip comes back to where it began.
 
+use super::fit::{self, Span};
 use super::{Moment, Shot, Worker};
+use crate::asset::Asset;
 use crate::render::raster::Stats;
 use crate::scene::Camera;
 use crate::time;
-use glam::{DAffine3, Vec3};
-
-/// Moments at which the lowest point is looked for.
-const MOMENTS: usize = 33;
+use glam::{DAffine3, DVec3, Vec3};
 
 /// Relative to the character's size, and to one for directions: what the eye takes for the same pose.
 const SAME: f64 = 2e-3;
 
-impl Shot<'_> {
-    /// The point of the ground that the character turns around, scene space: the axis of [`Moment::turn`] at the height of the lowest
-    /// vertex of the clip.
-    pub fn ground(&self, worker: &mut Worker) -> Vec3 {
-        let character = &self.asset.character;
-        let (mut lowest, mut points) = (f32::INFINITY, Vec::new());
-        for k in 0..MOMENTS {
-            let t = self.range.start + self.range.duration() * k as f64 / (MOMENTS - 1) as f64;
-            worker.evaluate(self.asset, self.desc.clip, t);
-            let Worker { pose, posed, scratch, .. } = &mut *worker;
-            for i in 0..character.instances().len() {
-                character.positions(i, pose, posed, self.center, scratch, &mut points);
-                lowest = points.iter().map(|p| p.y).filter(|y| y.is_finite()).fold(lowest, f32::min);
-            }
-            if self.range.duration() == 0.0 {
-                break;
-            }
+/// The point of the world where the character stands: what a game puts on its ground.
+///
+/// It is as high as the lowest vertex of the clip (of the rest pose for `None`), and lies below the world's origin if that is within the
+/// character's bounds over the clip or up to a tenth of their size beside them; else below their middle.
+///
+/// # Panics
+/// If the asset has no such clip.
+pub fn ground_point(asset: &Asset, clip: Option<usize>) -> DVec3 {
+    let mut worker = Worker::default();
+    worker.evaluate(asset, clip, clip.map_or(0.0, |c| asset.character.clips()[c].playback().start));
+    let center = asset.character.center(&worker.posed);
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    fit::each_moment(&Span { asset, clip, center }, None, &mut worker, |points| {
+        for p in points.iter().filter(|p| p.is_finite()) {
+            (low, high) = (low.min(*p), high.max(*p));
         }
-        Vec3::new(0.0, if lowest.is_finite() { lowest } else { 0.0 }, 0.0)
+    });
+    if !low.is_finite() {
+        return DVec3::ZERO;
     }
+    let (low, high) = (low.as_dvec3() + center, high.as_dvec3() + center);
+    let beside = (high - low).max_element() * 0.1;
+    let near = |low: f64, high: f64| (low - beside..=high + beside).contains(&0.0);
+    let stands = near(low.x, high.x) && near(low.z, high.z);
+    let below = if stands { DVec3::ZERO } else { (low + high) * 0.5 };
+    DVec3::new(below.x, low.y, below.z)
+}
 
-    /// Where a point of scene space is in the picture of a moment: fractions of its width and height from the top left, possibly
+impl Shot<'_> {
+    /// Where a point of the world is in the picture of a moment: fractions of its width and height from the top left, possibly
     /// outside. `None` behind the eye.
-    pub fn project(&self, moment: impl Into<Moment>, point: Vec3, worker: &mut Worker) -> Option<[f64; 2]> {
+    pub fn project(&self, moment: impl Into<Moment>, point: DVec3, worker: &mut Worker) -> Option<[f64; 2]> {
         let mut camera: Option<Camera> = None;
         self.with_scene(moment.into(), worker, |scene, _| {
             camera = Some(scene.camera);
@@ -43,7 +50,7 @@ impl Shot<'_> {
         });
         let settings = &self.desc.settings;
         let aspect = settings.width as f32 / settings.height.max(1) as f32;
-        let p = camera?.clip_from_scene(aspect).as_dmat4() * point.as_dvec3().extend(1.0);
+        let p = camera?.clip_from_scene(aspect).as_dmat4() * (point - self.center).extend(1.0);
         (p.w > 0.0).then(|| [0.5 + 0.5 * p.x / p.w, 0.5 - 0.5 * p.y / p.w])
     }
 

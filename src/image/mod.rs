@@ -1,6 +1,16 @@
 //! Pictures in memory: linear light in f32, and 8-bit sRGB for files. No files here.
+//!
+//! Chapter 1 of the notes, a module a section: [`sample`] §1.1, [`depth`] §1.2, [`gamma`], [`tone`] and [`dither`](mod@dither) §1.3,
+//! [`composite`] §1.4. [`develop`] joins them on the way from light to a file.
 
 pub mod color;
+pub mod composite;
+pub mod depth;
+pub mod develop;
+pub mod dither;
+pub mod gamma;
+pub mod sample;
+pub mod tone;
 
 /// `width × height` pixels of linear RGBA, alpha premultiplied, row by row from the top left.
 #[derive(Clone, Debug, PartialEq, Default)]

@@ -2,6 +2,8 @@
 
 #[cfg(feature = "io")]
 pub mod gltf;
+#[cfg(all(feature = "io", feature = "pictures"))]
+pub mod manifest;
 #[cfg(feature = "io")]
 pub mod notes;
 #[cfg(feature = "pictures")]

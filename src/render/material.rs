@@ -2,6 +2,7 @@
 
 use super::sample::{self, Uv};
 use super::shade::{self, Surface};
+use super::styled;
 use crate::math::simd::{self, F8, I8, Isa, V8};
 use crate::scene::{AlphaMode, Material, Scene, TextureRef};
 use glam::Affine2;
@@ -125,6 +126,9 @@ pub(crate) fn light(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> (
         openness,
         emissive,
     };
+    if !scene.style.is_plain() {
+        return (styled::light(isa, &surface, scene), alpha);
+    }
     (shade::blinn_phong(&surface, scene.ambient, &scene.lights), alpha)
 }
 

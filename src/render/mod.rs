@@ -4,6 +4,7 @@ pub mod channel;
 mod material;
 mod sample;
 mod shade;
+mod styled;
 
 // A loop that counts lanes is what becomes one vector instruction; iterators do not always.
 #[allow(clippy::needless_range_loop)]

@@ -1,7 +1,8 @@
 //! Promises checked on third-party files, found in `SINEW_DATA` or `../shared/data`.
 //!
-//! Without the files every test here is reported as ignored; with `SINEW_DATA` set to a missing folder the run fails.
+//! Without the files every test here is reported as ignored, as is a test whose tool is missing (under `CI` both fail); with `SINEW_DATA` set to a missing folder the run fails.
 
+mod farm;
 mod gltf_mutations;
 mod gltf_oracle;
 mod invalid;
@@ -21,6 +22,10 @@ fn main() {
         let run = move || test(dir.as_deref().expect("ignored without data")).map_err(Into::into);
         trials.push(Trial::test(*name, run).with_ignored_flag(data.is_none()));
     }
+    trials.push(
+        Trial::test("four_shards_by_gnu_parallel_are_the_whole", || farm::run().map_err(Into::into))
+            .with_ignored_flag(!farm::possible()),
+    );
     libtest_mimic::run(&Arguments::from_args(), trials).exit();
 }
 

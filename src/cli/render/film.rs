@@ -25,6 +25,8 @@ pub struct Job<'a> {
     pub level: PngLevel,
     pub threads: usize,
     pub force: bool,
+    /// Compute hashes.
+    pub hash: bool,
     /// Frames become pixel art; they are drawn before nothing then.
     pub art: Option<&'a PixelArt>,
     /// Pixels of a finished frame for each one that is drawn, across and down.
@@ -51,7 +53,16 @@ impl Job<'_> {
     }
 }
 
-pub fn write(job: &Job, say: &Say) -> Result<(), Failure> {
+/// What was written.
+#[derive(Default)]
+pub struct Written {
+    /// A hash a frame, if they were asked for: of its file or, in a film, of its pixels.
+    pub hashes: Vec<String>,
+    /// What the last frame cost.
+    pub stats: FrameStats,
+}
+
+pub fn write(job: &Job, say: &Say) -> Result<Written, Failure> {
     // A temporary must not outlive Ctrl-C or a request to terminate; the handler runs on a thread of its own.
     let _ = ctrlc::set_handler(|| {
         picture::cleanup_temporaries();
@@ -59,19 +70,20 @@ pub fn write(job: &Job, say: &Say) -> Result<(), Failure> {
     });
     refuse_existing(job)?;
     let start = Instant::now();
-    let total = match job.target {
+    let stats = match job.target {
         Target::Still(_) | Target::Sequence(_) => stills(job, say)?,
         Target::Film(path, Format::Apng) => apng(job, path, say)?,
         Target::Film(path, _) => gif(job, path, say)?,
     };
+    let written = Written { stats, hashes: vec![] };
     let n = job.frames.len();
     let seconds = start.elapsed().as_secs_f64();
     say.detail(&format!(
         "{n} frames in {seconds:.3} s ({:.2} ms each), a frame: {} bones, {} vertices; {:?}",
         1e3 * seconds / n as f64,
-        total.bones,
-        total.vertices,
-        total.raster
+        written.stats.bones,
+        written.stats.vertices,
+        written.stats.raster
     ));
     say.note(&match job.target {
         Target::Sequence(_) if n > 1 => {
@@ -80,7 +92,7 @@ pub fn write(job: &Job, say: &Say) -> Result<(), Failure> {
         }
         _ => format!("wrote {}", job.target.path_of(job.frames[0].number).display()),
     });
-    Ok(())
+    Ok(written)
 }
 
 fn failed(e: picture::Error) -> Failure {

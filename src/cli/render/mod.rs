@@ -1,6 +1,7 @@
 //! `sinew render`: what is to be drawn, from where, and into which files. One file a group of options.
 
 mod batch;
+mod bone;
 mod camera;
 mod film;
 mod look;
@@ -9,15 +10,16 @@ mod overlay;
 mod sheet;
 mod time;
 
-use super::{Failure, load_posed, print, say, say::Say};
-use film::Job;
+use super::{Failure, print, say, say::Say};
+use film::{Job, Written};
 use sinew::asset::Asset;
 use sinew::frames::{Shot, ShotDesc};
-use sinew::io::Options;
+use sinew::io::Import;
 use sinew::io::picture::Target;
 use sinew::render::Settings;
 use sinew::time::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use time::Frame;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -26,10 +28,14 @@ Examples:
   sinew render fox.glb -o run.####.png --clip Run --fps 30 --background transparent
   sinew render fox.glb -o part.%04d.png --frames 1-48x2,60
   sinew render fox.glb -o side.apng --camera yaw=90,pitch=5,fov=20
-  sinew render rigs/pip.json -o pip-sheet.png --sheet trimmed --directions 8 --camera yaw=0,pitch=30,fov=0 --size 128 --fps 12
+  sinew render rigs/pip.json -o pip-sheet.png --sheet trimmed --directions 8 --camera pitch=30,yaw=0,ortho --size 128 --fps 12
   sinew render fox.glb -o fox-sheet.png --sheet grid --maps normal,depth,id --sheet-json aseprite --size 128
   sinew render fox.glb -o fox.gif --pixel-art --pixel-scale 4 --size 256 --colors 16 --outline
   sinew render fox.glb -o fox-contact.png --contact 6x4 --size 160
+  sinew render fox.glb -o icon.png --camera isometric --background transparent
+  sinew render rigs/fox.json -o round.gif --turntable
+  sinew render *.glb --all-clips -o thumbs/{name}-{clip}.gif
+  sinew render fox.glb -o farm.####.png --shard 2/4 --manifest part2.json
   sinew render fox.glb --list
 
 Frames are numbered from 1; frame 1 shows 0 s, or the clip's first key if that is earlier. The camera orbits the character and stands where all of it is
@@ -38,8 +44,9 @@ seen over the whole clip, unless --camera names one of the asset's. An existing 
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// A glTF file (.gltf, .glb) or a rig (.json).
-    input: PathBuf,
+    /// glTF files (.gltf, .glb) or rigs (.json).
+    #[arg(required = true, value_name = "INPUT")]
+    inputs: Vec<PathBuf>,
     /// Show the clips and cameras of the input and stop.
     #[arg(long)]
     list: bool,
@@ -60,76 +67,88 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
-    let usage = |e: &dyn std::fmt::Display| Failure::Usage(e.to_string());
-    let target = args.output.target()?;
-    let settings = args.sheet.settings(args.output.settings()?)?;
-    let threads = args.output.threads();
+    batch::run(args, say)
+}
 
-    let options = Options { textures: target.is_some() };
-    let import = load_posed(&args.input, args.time.poses.as_ref(), options, say)?;
-    let asset = &import.asset;
-    let Some(target) = target.filter(|_| !args.list) else { return list(asset) };
-    keep_inputs(args, &target)?;
+/// One output: an asset, one of its clips or rest, and where the pictures go.
+struct Task<'a> {
+    input: &'a Path,
+    import: &'a Import,
+    clip: Option<usize>,
+    target: &'a Target,
+}
+
+/// Which pictures an output consists of.
+struct Plan {
+    frames: Vec<Frame>,
+    size: [usize; 2],
+}
+
+fn plan(args: &Args, task: &Task) -> Result<Plan, Failure> {
+    let clips = task.import.asset.character.clips();
+    let range = task.clip.map_or(Range::default(), |c| clips[c].playback());
     let one_picture = args.sheet.is_one_picture();
-    let clip = args.time.clip(&import)?;
-    let range = clip.map_or(Range::default(), |c| asset.character.clips()[c].playback());
-    let alone = matches!(target, Target::Still(_)) && !one_picture;
-    let mut frames = args.time.frames(&args.input, range, alone)?;
+    let alone = matches!(task.target, Target::Still(_)) && !one_picture;
+    let frames = args.time.frames(task.input, range, alone, args.camera.turntable)?;
     if !one_picture {
-        target.check_frames(frames.len()).map_err(|e| usage(&e))?;
+        task.target.check_frames(frames.len()).map_err(|e| Failure::Usage(e.to_string()))?;
     }
+    let settings = args.output.settings()?;
+    Ok(Plan { frames, size: [settings.width, settings.height] })
+}
 
+/// Draw the frames of a plan and write them.
+fn draw(args: &Args, task: &Task, plan: &Plan, say: &Say) -> Result<Written, Failure> {
+    let asset = &task.import.asset;
     let character = &asset.character;
     if character.instances().iter().all(|i| character.mesh(i).triangles.is_empty()) {
-        say.warn(&format!("{}: there are no triangles; the picture will be empty", args.input.display()));
+        say.warn(&format!("{}: there are no triangles; the picture will be empty", task.input.display()));
+    }
+
+    let range = task.clip.map_or(Range::default(), |c| character.clips()[c].playback());
+    if let Some(note) = args.camera.turntable.and_then(|lap| args.time.seam(range, lap)) {
+        say.note(&note);
     }
 
     // One picture is drawn by all threads, many by one thread each.
-    let settings =
-        Settings { threads: if frames.len() == 1 && !one_picture { threads } else { 1 }, ..settings };
-    let mut look = args.look.look(asset)?;
-    let background = if args.sheet.is_transparent() { [0.0; 4] } else { look.background };
-    if args.sheet.clears_background() {
-        look.background = [0.0; 4];
-    }
-    let desc = ShotDesc { clip, wrap: args.time.wrap, view: args.camera.view(asset)?, look, settings };
-    let shot = Shot::new(asset, desc).map_err(|e| usage(&e))?;
-    if let Some(moments) = args.sheet.contact_frames(&shot) {
-        frames = moments;
-    }
+    let threads = args.output.threads();
+    let one_picture = args.sheet.is_one_picture();
+    let alone = plan.frames.len() == 1 && !one_picture;
+    let settings = args.sheet.settings(args.output.settings()?)?;
+    let settings = Settings { threads: if alone { threads } else { 1 }, ..settings };
+    let desc = ShotDesc {
+        clip: task.clip,
+        wrap: args.time.wrap(args.camera.turntable),
+        view: args.sheet.view(args.camera.view(asset)?, args.camera.is_default()),
+        framing: args.camera.framing(asset)?,
+        look: args.look.look(asset)?,
+        settings,
+    };
+    let background = if args.sheet.is_transparent() { [0.0; 4] } else { desc.look.background };
+    let desc = args.sheet.desc(desc, asset);
+    let shot = Shot::new(asset, desc).map_err(|e| Failure::Usage(e.to_string()))?;
+    let moments = args.sheet.contact_frames(&shot);
     let mut job = Job {
         shot: &shot,
-        frames: &frames,
+        frames: moments.as_ref().unwrap_or(&plan.frames),
         rate: args.time.fps,
         transparent: args.look.transparent() || args.sheet.is_transparent(),
-        target: &target,
+        target: task.target,
         level: args.output.png,
         threads,
         force: args.output.force,
+        hash: args.batch.manifest.is_some(),
         art: None,
         scale: args.sheet.pixels.scale(),
     };
     let art = args.sheet.pixels.art(&job, background, say)?;
     job.art = art.as_ref();
     if one_picture {
-        let name = clip.map_or("rest", |c| asset.character.clips()[c].name.as_str());
-        return args.sheet.write(&job, name, art.as_ref(), say);
+        let name = task.clip.map_or("rest", |c| character.clips()[c].name.as_str());
+        args.sheet.write(&job, name, art.as_ref(), say)?;
+        return Ok(Written::default());
     }
     film::write(&job, say)
-}
-
-/// Refuse to write over what is being read, `--force` or not.
-fn keep_inputs(args: &Args, target: &Target) -> Result<(), Failure> {
-    let inputs = || [Some(&args.input), args.time.poses.as_ref()].into_iter().flatten();
-    for output in args.sheet.companions(target).into_iter().chain([target.path_of(1)]) {
-        let Ok(written) = output.canonicalize() else { continue };
-        if let Some(input) = inputs().find(|i| i.canonicalize().is_ok_and(|i| i == written)) {
-            let message =
-                format!("-o {}: {} is the input; choose another name", output.display(), input.display());
-            return Err(Failure::Usage(message));
-        }
-    }
-    Ok(())
 }
 
 fn list(asset: &Asset) -> Result<(), Failure> {

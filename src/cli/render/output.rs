@@ -3,14 +3,14 @@
 use crate::cli::Failure;
 use sinew::io::picture::{Format, PngLevel, Target};
 use sinew::render::Settings;
-use std::path::PathBuf;
 
 #[derive(clap::Args)]
 #[command(next_help_heading = "Output")]
 pub struct OutputArgs {
-    /// A picture (.png), a numbered sequence (out.####.png, out.%04d.png) or a film (.gif, .apng).
+    /// A picture (.png), a numbered sequence (out.####.png, out.%04d.png) or a film (.gif, .apng); of several inputs or clips with
+    /// {name}, {folder} and {clip} in it.
     #[arg(short, long, value_name = "OUT", required_unless_present = "list")]
-    output: Option<PathBuf>,
+    output: Option<String>,
     /// Pixels, as in 512 or 1920x1080.
     #[arg(long, default_value = "512", value_name = "WxH", value_parser = parse_size)]
     size: [usize; 2],
@@ -32,10 +32,15 @@ pub struct OutputArgs {
 }
 
 impl OutputArgs {
-    /// What the output's name asks for.
-    pub fn target(&self) -> Result<Option<Target>, Failure> {
-        let parse = |path| if self.apng { Target::parse_as(path, Format::Apng) } else { Target::parse(path) };
-        self.output.as_ref().map(parse).transpose().map_err(|e| Failure::Usage(e.to_string()))
+    /// The output's name, its fields unfilled.
+    pub fn name(&self) -> &str {
+        self.output.as_deref().unwrap_or_default()
+    }
+
+    /// What a name asks for.
+    pub fn target(&self, name: &str) -> Result<Target, Failure> {
+        let target = if self.apng { Target::parse_as(name, Format::Apng) } else { Target::parse(name) };
+        target.map_err(|e| Failure::Usage(e.to_string()))
     }
 
     /// Size and samples, for drawing on one thread.

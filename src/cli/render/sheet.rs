@@ -11,7 +11,8 @@ pub use pixels::PixelArgs;
 use super::film::Job;
 use super::time::Frame;
 use crate::cli::{Failure, say::Say};
-use sinew::frames::Shot;
+use sinew::asset::Asset;
+use sinew::frames::{Pivot as Axis, Shot, ShotDesc, Turns, View, ground_point};
 use sinew::io::picture::{PixelArt, Target};
 use sinew::io::sheet_json::Style;
 use sinew::render::Settings;
@@ -24,8 +25,8 @@ pub struct SheetArgs {
     /// visible and packed, equal frames once.
     #[arg(long, value_name = "grid|trimmed", value_parser = parse_kind)]
     sheet: Option<Kind>,
-    /// Draw the character from N sides at equal steps, 1 to 64: first as --camera stands, then on counter-clockwise as seen from above. Frames are
-    /// named clip/direction/number. South is towards the viewer, so with yaw=0 eight sides are s, sw, w, nw, n, ne, e, se.
+    /// Draw the character from N sides at equal steps, 1 to 64: first as --camera stands (yaw=0 unless it is given), then on counter-clockwise
+    /// as seen from above. Frames are named clip/direction/number. South is towards the viewer, so eight sides are s, sw, w, nw, n, ne, e, se.
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=64))]
     directions: u8,
     /// Columns of a grid; by default the frames of a direction, or about a square if there is one direction.
@@ -90,9 +91,27 @@ impl SheetArgs {
         self.sheet.is_some() || self.contact.is_some()
     }
 
-    /// Whether frames are drawn before nothing, whatever stands behind them later.
-    pub fn clears_background(&self) -> bool {
-        self.sheet.is_some() || self.pixels.is_on()
+    /// The camera; directions start in front of the character unless somebody `placed` it elsewhere.
+    pub fn view(&self, view: View, nobody_placed: bool) -> View {
+        match view {
+            View::Orbit { pitch, fov_y, .. } if nobody_placed && self.directions > 1 => {
+                View::Orbit { yaw: 0.0, pitch, fov_y }
+            }
+            view => view,
+        }
+    }
+
+    /// A shot as it is drawn for a sheet or for pixel art: before nothing, whatever stands behind it later, and with a framing
+    /// that holds all directions.
+    pub fn desc(&self, mut desc: ShotDesc, asset: &Asset) -> ShotDesc {
+        if self.sheet.is_some() || self.pixels.is_on() {
+            desc.look.background = [0.0; 4];
+        }
+        if self.directions > 1 && desc.framing.turns == Turns::None {
+            desc.framing.turns = Turns::Each(self.directions.into());
+            desc.framing.pivot = Axis::At(ground_point(asset, desc.clip));
+        }
+        desc
     }
 
     /// Whether the result is transparent whatever the background is.

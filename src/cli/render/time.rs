@@ -32,7 +32,7 @@ pub struct TimeArgs {
     pub fps: Rate,
     /// What times outside the clip show: its ends (clamp), the clip again (loop), or there and back (ping-pong).
     #[arg(long, default_value = "clamp", value_name = "MODE", value_parser = parse_wrap)]
-    pub wrap: Wrap,
+    wrap: Wrap,
 }
 
 /// A frame's number and what it shows.
@@ -48,22 +48,65 @@ impl TimeArgs {
         if self.rest { Ok(None) } else { find_clip(import, self.clip.as_deref()) }
     }
 
-    /// The frames to be drawn; `alone` if one picture is wanted where nothing says which.
-    pub fn frames(&self, input: &Path, range: Range, alone: bool) -> Result<Vec<Frame>, Failure> {
-        if let Some(t) = self.at {
+    /// The frames to be drawn; `alone` if one picture is wanted where nothing says which; `lap` if the camera walks around in
+    /// so many seconds.
+    pub fn frames(
+        &self,
+        input: &Path,
+        range: Range,
+        alone: bool,
+        lap: Option<f64>,
+    ) -> Result<Vec<Frame>, Failure> {
+        if let (Some(t), None) = (self.at, lap) {
             return Ok(vec![Frame { number: 1, moment: t.into() }]);
         }
-        let timed = |n: i64| Frame { number: n, moment: frame_time(range.start, n, self.fps).into() };
+        let steps = lap.map(|lap| self.steps(lap));
+        let timed = |n: i64| Frame { number: n, moment: self.moment(range, n, steps) };
+        let whole = Range { start: 0.0, end: lap.unwrap_or(range.duration()) };
         match &self.frames {
             Some(set) => Ok(set.iter().map(timed).collect()),
             None if alone => Ok(vec![timed(1)]),
             None => {
-                let count = frame_count(range, self.fps.fps(), MOST_FRAMES);
+                let count = frame_count(whole, self.fps.fps(), MOST_FRAMES);
                 let count =
                     count.map_err(|e| Failure::Run(format!("{}: {e} (--frames, --fps)", input.display())))?;
                 Ok((1..=count as i64).map(timed).collect())
             }
         }
+    }
+
+    /// Frames of a lap: frame 1 is without a turn, and so would be the one after the last.
+    fn steps(&self, lap: f64) -> f64 {
+        (lap * self.fps.fps()).round().max(1.0)
+    }
+
+    fn moment(&self, range: Range, number: i64, steps: Option<f64>) -> Moment {
+        let time = self.at.unwrap_or_else(|| frame_time(range.start, number, self.fps));
+        let around = |steps: f64| std::f64::consts::TAU * ((number as f64 - 1.0).rem_euclid(steps) / steps);
+        Moment { time, turn: steps.map_or(0.0, around) as f32 }
+    }
+
+    /// What times outside the clip show; a clip goes on while the camera walks around.
+    pub fn wrap(&self, lap: Option<f64>) -> Wrap {
+        if lap.is_some() && self.wrap == Wrap::Clamp { Wrap::Loop } else { self.wrap }
+    }
+
+    /// What to say where the film of a lap ends in the midst of the clip, and so jumps.
+    pub fn seam(&self, range: Range, lap: f64) -> Option<String> {
+        let clip = range.duration() * if self.wrap == Wrap::PingPong { 2.0 } else { 1.0 };
+        if self.at.is_some() || clip <= 0.0 {
+            return None;
+        }
+        let times = (lap / clip).round().max(1.0);
+        if (lap - times * clip).abs() * self.fps.fps() <= 0.5 {
+            return None;
+        }
+        let fits = format!("{:.3}", times * clip);
+        let fits = fits.trim_end_matches('0').trim_end_matches('.');
+        let loops = if times == 1.0 { "once".into() } else { format!("{times} times") };
+        Some(format!(
+            "the clip of {clip:.3} s is cut where the turn of {lap} s ends; --turntable {fits} shows it {loops}"
+        ))
     }
 }
 

@@ -26,6 +26,8 @@ mod palette_file;
 mod pixel_art;
 mod png;
 mod target;
+mod template;
+mod unnamed;
 
 pub use apng::ApngWriter;
 pub use atomic::{AtomicFile, Folder, cleanup_temporaries};
@@ -39,6 +41,7 @@ pub use palette_file::PaletteError;
 pub use pixel_art::{PixelArt, PixelArtDesc};
 pub use png::{PngLevel, encode_png};
 pub use target::{Format, Pattern, Target, TargetError};
+pub use template::{Fields, Template, TemplateError};
 
 use crate::image::Rgba8;
 use std::path::PathBuf;

@@ -182,6 +182,16 @@ impl Target {
         }
     }
 
+    /// The name, with `#` where the frame number goes.
+    pub fn name(&self) -> PathBuf {
+        match self {
+            Self::Still(path) | Self::Film(path, _) => path.clone(),
+            Self::Sequence(Pattern { folder, around: [before, after], width }) => {
+                folder.join(format!("{before}{}{after}", "#".repeat(*width)))
+            }
+        }
+    }
+
     /// Refuse several frames for a name that holds one picture.
     ///
     /// # Errors

@@ -71,8 +71,8 @@ pub struct Stats {
     pub shaded: u64,
 }
 
-impl Stats {
-    fn add(&mut self, o: &Self) {
+impl std::ops::AddAssign for Stats {
+    fn add_assign(&mut self, o: Self) {
         self.triangles += o.triangles;
         self.vertices += o.vertices;
         self.skipped += o.skipped;
@@ -101,7 +101,7 @@ impl Stats {
 /// };
 /// let camera = Camera::look_at(Vec3::Z * 3.0, Vec3::ZERO, Vec3::Y, Projection::Orthographic { height: 1.0 });
 /// let scene = Scene {
-///     camera: camera.unwrap(), ambient: Vec3::ONE, lights: vec![], background: [0.0; 4],
+///     camera: camera.unwrap(), ambient: Vec3::ONE, lights: vec![], style: Default::default(), background: [0.0; 4],
 ///     objects: vec![object], materials: &[Material::default()], textures: &[],
 /// };
 /// let mut picture = Rgba8::default();
@@ -205,8 +205,8 @@ impl Rasterizer {
                 simd::run(isa, tile::Row { frame: &frame, bins, row, scratch, target: &mut target });
             }
         });
-        bins.iter().for_each(|b| stats.add(&b.stats));
-        self.tiles[..threads].iter().for_each(|t| stats.add(&t.stats));
+        bins.iter().for_each(|b| stats += b.stats);
+        self.tiles[..threads].iter().for_each(|t| stats += t.stats);
         stats
     }
 }

@@ -208,7 +208,7 @@ fn pivots(args: &SheetArgs, plan: &Plan) -> Vec<[f64; 2]> {
         return vec![at; plan.frames.len()];
     }
     let (shot, mut worker) = (plan.job.shot, Worker::default());
-    let ground = shot.ground(&mut worker);
+    let ground = shot.ground_point();
     let mut find = |f: &Frame| shot.project(f.moment, ground, &mut worker).unwrap_or([0.5, 1.0]);
     plan.frames.iter().map(&mut find).collect()
 }
