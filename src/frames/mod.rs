@@ -12,7 +12,7 @@ mod worker;
 
 pub use framing::{Framing, Turns};
 pub use look::{Look, Shading};
-pub use ordered::{Stop, in_order};
+pub use ordered::{Stop, in_order, in_order_pairs};
 pub use pivot::ground_point;
 pub use view::{FramingDesc, Pivot, View, ViewError};
 pub use worker::Worker;

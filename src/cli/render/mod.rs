@@ -8,6 +8,7 @@ mod look;
 mod output;
 mod overlay;
 mod sheet;
+mod stats;
 mod time;
 
 use super::{Failure, print, say, say::Say};
@@ -18,7 +19,9 @@ use sinew::io::Import;
 use sinew::io::picture::Target;
 use sinew::render::Settings;
 use sinew::time::Range;
+use stats::Totals;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 use time::Frame;
 
 const EXAMPLES: &str = "\
@@ -67,6 +70,11 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
+    // A temporary must not outlive Ctrl-C or a request to terminate; the handler runs on a thread of its own.
+    let _ = ctrlc::set_handler(|| {
+        sinew::io::picture::cleanup_temporaries();
+        std::process::exit(130);
+    });
     batch::run(args, say)
 }
 
@@ -88,7 +96,7 @@ fn plan(args: &Args, task: &Task) -> Result<Plan, Failure> {
     let clips = task.import.asset.character.clips();
     let range = task.clip.map_or(Range::default(), |c| clips[c].playback());
     let one_picture = args.sheet.is_one_picture();
-    let alone = matches!(task.target, Target::Still(_)) && !one_picture;
+    let alone = !task.target.takes_a_clip() && !one_picture;
     let frames = args.time.frames(task.input, range, alone, args.camera.turntable)?;
     if !one_picture {
         task.target.check_frames(frames.len()).map_err(|e| Failure::Usage(e.to_string()))?;
@@ -98,7 +106,7 @@ fn plan(args: &Args, task: &Task) -> Result<Plan, Failure> {
 }
 
 /// Draw the frames of a plan and write them.
-fn draw(args: &Args, task: &Task, plan: &Plan, say: &Say) -> Result<Written, Failure> {
+fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -> Result<Written, Failure> {
     let asset = &task.import.asset;
     let character = &asset.character;
     if character.instances().iter().all(|i| character.mesh(i).triangles.is_empty()) {
@@ -125,8 +133,10 @@ fn draw(args: &Args, task: &Task, plan: &Plan, say: &Say) -> Result<Written, Fai
         settings,
     };
     let background = if args.sheet.is_transparent() { [0.0; 4] } else { desc.look.background };
+    let start = Instant::now();
     let desc = args.sheet.desc(desc, asset);
     let shot = Shot::new(asset, desc).map_err(|e| Failure::Usage(e.to_string()))?;
+    totals.framing += start.elapsed();
     let moments = args.sheet.contact_frames(&shot);
     let mut job = Job {
         shot: &shot,
@@ -141,14 +151,16 @@ fn draw(args: &Args, task: &Task, plan: &Plan, say: &Say) -> Result<Written, Fai
         art: None,
         scale: args.sheet.pixels.scale(),
     };
-    let art = args.sheet.pixels.art(&job, background, say)?;
-    job.art = art.as_ref();
-    if one_picture {
+    job.art = args.sheet.pixels.art(&job, background, say)?;
+    let written = if one_picture {
         let name = task.clip.map_or("rest", |c| character.clips()[c].name.as_str());
-        args.sheet.write(&job, name, art.as_ref(), say)?;
-        return Ok(Written::default());
-    }
-    film::write(&job, say)
+        args.sheet.write(&job, name, say)?;
+        Written::default()
+    } else {
+        film::write(&job, say)?
+    };
+    totals.add(&written, job.frames.len());
+    Ok(written)
 }
 
 fn list(asset: &Asset) -> Result<(), Failure> {

@@ -6,14 +6,14 @@ mod maps;
 mod pixels;
 mod sprites;
 
-pub use pixels::PixelArgs;
+pub use pixels::{Painter, PixelArgs};
 
 use super::film::Job;
 use super::time::Frame;
 use crate::cli::{Failure, say::Say};
 use sinew::asset::Asset;
 use sinew::frames::{Pivot as Axis, Shot, ShotDesc, Turns, View, ground_point};
-use sinew::io::picture::{PixelArt, Target};
+use sinew::io::picture::{Format, Target};
 use sinew::io::sheet_json::Style;
 use sinew::render::Settings;
 use std::path::PathBuf;
@@ -136,18 +136,18 @@ impl SheetArgs {
 
     /// Files that are written beside the picture.
     pub fn companions(&self, target: &Target) -> Vec<PathBuf> {
-        let picture = target.path_of(1);
+        let Some(picture) = target.path_of(1) else { return Vec::new() };
         let json = self.sheet.and(self.sheet_json.0).map(|_| picture.with_extension("json"));
         let map = |m: &MapName| picture.with_extension(format!("{}.png", m.name()));
         json.into_iter().chain(self.maps().iter().map(map)).collect()
     }
 
     /// Draw and write the sheet.
-    pub fn write(&self, job: &Job, clip: &str, art: Option<&PixelArt>, say: &Say) -> Result<(), Failure> {
-        let Target::Still(path) = job.target else {
+    pub fn write(&self, job: &Job, clip: &str, say: &Say) -> Result<(), Failure> {
+        let Target::Still(path, Format::Png | Format::Webp) = job.target else {
             let message = format!(
-                "-o {}: a sheet is one picture; expected a name such as sheet.png",
-                job.target.path_of(1).display()
+                "-o {}: a sheet is one picture; expected a name such as sheet.png or sheet.webp",
+                job.target.name().display()
             );
             return Err(Failure::Usage(message));
         };
@@ -158,8 +158,8 @@ impl SheetArgs {
             return Err(Failure::Run(message));
         }
         match (self.sheet, self.contact) {
-            (Some(kind), _) => sprites::write(self, kind, job, clip, art, path, say),
-            (None, Some(cells)) => contact::write(cells, job, art, path, say),
+            (Some(kind), _) => sprites::write(self, kind, job, clip, path, say),
+            (None, Some(cells)) => contact::write(cells, job, path, say),
             (None, None) => Ok(()),
         }
     }

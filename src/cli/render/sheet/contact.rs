@@ -6,7 +6,7 @@ use super::draw;
 use crate::cli::{Failure, say::Say};
 use sinew::frames::{Shot, Worker};
 use sinew::image::Rgba8;
-use sinew::io::picture::{self, AtomicFile, Folder, Indexed, PixelArt, encode_indexed_png, encode_png};
+use sinew::io::picture::{self, AtomicFile, Folder};
 use sinew::sheet::{Canvas, Limits, Margins, Rect, grid};
 use std::path::Path;
 
@@ -32,42 +32,34 @@ pub fn frames([columns, rows]: [usize; 2], shot: &Shot) -> Vec<Frame> {
     (0..count).map(|k| Frame { number: k as i64 + 1, moment: time(k).into() }).collect()
 }
 
-pub fn write(
-    [columns, rows]: [usize; 2],
-    job: &Job,
-    art: Option<&PixelArt>,
-    path: &Path,
-    say: &Say,
-) -> Result<(), Failure> {
+pub fn write([columns, rows]: [usize; 2], job: &Job, path: &Path, say: &Say) -> Result<(), Failure> {
     let size = job.size();
     let gap = (size[1] / THIN).max(2);
     let margins = Margins { between: gap, around: gap, extrude: 0 };
     let layout = grid(columns * rows, size, columns, margins, Limits::default());
     let layout = layout.map_err(|e| Failure::Run(format!("--contact {columns}x{rows}: {e}")))?;
-    let bytes = match art {
+    // White between coloured cells, nothing between transparent ones.
+    let fill = if job.transparent { [0; 4] } else { [255; 4] };
+    let bytes = match &job.art {
         Some(art) => {
             let mut canvas = Canvas::new(&layout, art.palette().transparent());
-            let one = |mapper: &mut _, w: &mut Worker, f: &Frame| {
+            let one = |w: &mut Worker, f: &Frame| {
                 let mut out = Rgba8::default();
                 job.shot.draw(f.moment, w, &mut out);
-                art.finish(mapper, &out).indices
+                art.map(&out).indices
             };
-            draw::frames(job, job.frames, say, || art.mapper(), one, put(&mut canvas, &layout.places))?;
-            let picture = Indexed { size: canvas.size, indices: canvas.pixels };
-            encode_indexed_png(&picture, art.palette(), job.level)
+            draw::frames(job, job.frames, say, one, put(&mut canvas, &layout.places))?;
+            draw::encode_indexed(job, canvas, art)
         }
         None => {
-            // White between coloured cells, nothing between transparent ones.
-            let fill = if job.transparent { [0; 4] } else { [255; 4] };
             let mut canvas = Canvas::new(&layout, fill);
-            let one = |_: &mut (), w: &mut Worker, f: &Frame| {
+            let one = |w: &mut Worker, f: &Frame| {
                 let mut out = Rgba8::default();
                 job.shot.draw(f.moment, w, &mut out);
                 out.data.as_chunks::<4>().0.to_vec()
             };
-            draw::frames(job, job.frames, say, || (), one, put(&mut canvas, &layout.places))?;
-            let [width, height] = canvas.size;
-            encode_png(&Rgba8 { width, height, data: canvas.pixels.into_flattened() }, job.level)
+            draw::frames(job, job.frames, say, one, put(&mut canvas, &layout.places))?;
+            draw::encode(job, canvas)
         }
     };
     let failed = |e: picture::Error| Failure::Run(e.to_string());

@@ -2,10 +2,10 @@
 
 use super::super::time::Frame;
 use super::sprites::{Placed, Plan, file_name};
-use super::{MapName, SheetArgs, draw};
+use super::{MapName, Painter, SheetArgs, draw};
 use crate::cli::{Failure, say::Say};
 use sinew::frames::Worker;
-use sinew::io::picture::{self, Data, PixelArt, encode_data_png};
+use sinew::io::picture::{self, Data, encode_data_png};
 use sinew::render::channel::{Channel, Channels};
 use sinew::sheet::{Canvas, Layout, Map, MapKind, Rect};
 use std::path::{Path, PathBuf};
@@ -30,7 +30,6 @@ pub fn draw(
     args: &SheetArgs,
     plan: &Plan,
     placed: &Placed,
-    art: Option<&PixelArt>,
     path: &Path,
     say: &Say,
 ) -> Result<(Vec<Map>, Files), Failure> {
@@ -43,7 +42,7 @@ pub fn draw(
         let n = names.len();
         return Err(Failure::Run(format!("--maps id: {n} objects; expected at most {MOST_OBJECTS}")));
     }
-    let canvases = fill(args, plan, placed, &wanted, art, say)?;
+    let canvases = fill(args, plan, placed, &wanted, say)?;
     let (mut maps, mut files) = (Vec::new(), Vec::new());
     for name in wanted {
         let file = path.with_extension(format!("{}.png", name.name()));
@@ -65,7 +64,6 @@ fn fill(
     plan: &Plan,
     placed: &Placed,
     wanted: &[MapName],
-    art: Option<&PixelArt>,
     say: &Say,
 ) -> Result<Canvases, Failure> {
     let Layout { places, .. } = &placed.layout;
@@ -81,8 +79,8 @@ fn fill(
         depth: has(MapName::Depth).then(|| Canvas::new(&placed.layout, f32::INFINITY)),
         normals: has(MapName::Normal).then(|| Canvas::new(&placed.layout, FLAT)),
     };
-    let (scale, outlined) = (args.pixels.scale(), art.is_some_and(PixelArt::is_outlined));
-    let one = |_: &mut (), w: &mut Worker, f: &Frame| {
+    let (scale, outlined) = (args.pixels.scale(), plan.job.art.as_ref().is_some_and(Painter::is_outlined));
+    let one = |w: &mut Worker, f: &Frame| {
         let mut out = Channels::default();
         plan.job.shot.draw_channels(f.moment, w, &channels, &mut out);
         if outlined {
@@ -90,27 +88,19 @@ fn fill(
         }
         out
     };
-    draw::frames(
-        plan.job,
-        &frames,
-        say,
-        || (),
-        one,
-        |i, seen| {
-            let (place, trim, extrude) = (places[i], placed.cuts[chosen[i]].1, plan.margins.extrude);
-            let at = |trim: Rect| indices(trim, seen.width, scale);
-            to.objects.put(place, &at(trim).map(|k| seen.objects[k]).collect::<Vec<_>>(), extrude);
-            if let Some(depth) = &mut to.depth {
-                depth.put(place, &at(trim).map(|k| seen.depth[k]).collect::<Vec<_>>(), extrude);
-            }
-            if let Some(normals) = &mut to.normals {
-                let code =
-                    |k: usize| if seen.objects[k] > 0 { encode(seen.normals[k].to_array()) } else { FLAT };
-                normals.put(place, &at(trim).map(code).collect::<Vec<_>>(), extrude);
-            }
-            Ok(())
-        },
-    )?;
+    draw::frames(plan.job, &frames, say, one, |i, seen| {
+        let (place, trim, extrude) = (places[i], placed.cuts[chosen[i]].1, plan.margins.extrude);
+        let at = |trim: Rect| indices(trim, seen.width, scale);
+        to.objects.put(place, &at(trim).map(|k| seen.objects[k]).collect::<Vec<_>>(), extrude);
+        if let Some(depth) = &mut to.depth {
+            depth.put(place, &at(trim).map(|k| seen.depth[k]).collect::<Vec<_>>(), extrude);
+        }
+        if let Some(normals) = &mut to.normals {
+            let code = |k: usize| if seen.objects[k] > 0 { encode(seen.normals[k].to_array()) } else { FLAT };
+            normals.put(place, &at(trim).map(code).collect::<Vec<_>>(), extrude);
+        }
+        Ok(())
+    })?;
     Ok(to)
 }
 

@@ -9,10 +9,11 @@ use sinew::frames::Worker;
 use sinew::image::{Rgba8, color::encode_srgb8};
 use sinew::io::{
     self,
-    picture::{Dither, Palette, PixelArt, PixelArtDesc},
+    picture::{self, Dither, Indexed, Mapper, Palette, PixelArt, PixelArtDesc, PngLevel, encode_indexed_png},
 };
 use sinew::render::Settings;
 use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
 
 /// Frames that a palette is made from.
 const PALETTE_FRAMES: usize = 64;
@@ -38,6 +39,41 @@ pub struct PixelArgs {
     /// A line of one pixel around the character, as #rrggbb; black unless a colour is given.
     #[arg(long, value_name = "COLOR", num_args = 0..=1, default_missing_value = "#000000", requires = "pixel_art", value_parser = parse_color)]
     outline: Option<[u8; 3]>,
+}
+
+/// Paints frames on any thread; what a thread has looked up serves the next one.
+pub struct Painter {
+    art: PixelArt,
+    mappers: Mutex<Vec<Mapper>>,
+}
+
+impl Painter {
+    pub fn palette(&self) -> &Palette {
+        self.art.palette()
+    }
+
+    pub fn is_outlined(&self) -> bool {
+        self.art.is_outlined()
+    }
+
+    /// A drawn frame as indices into the palette.
+    pub fn map(&self, drawn: &Rgba8) -> Indexed {
+        let idle = || self.mappers.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut mapper = idle().pop().unwrap_or_else(|| self.art.mapper());
+        let indexed = self.art.finish(&mut mapper, drawn);
+        idle().push(mapper);
+        indexed
+    }
+
+    /// A drawn frame in the palette's colours.
+    pub fn paint(&self, drawn: &Rgba8) -> Rgba8 {
+        self.map(drawn).to_rgba8(self.palette())
+    }
+
+    /// A painted frame as a PNG with the palette.
+    pub fn encode_png(&self, painted: &Rgba8, level: PngLevel) -> Result<Vec<u8>, picture::Error> {
+        encode_indexed_png(&Indexed::of_rgba8(painted, self.palette()), self.palette(), level)
+    }
 }
 
 impl PixelArgs {
@@ -68,7 +104,7 @@ impl PixelArgs {
     }
 
     /// What frames become, if pixel art is asked for: `background` is linear and premultiplied, and nothing if transparent.
-    pub fn art(&self, job: &Job, background: [f32; 4], say: &Say) -> Result<Option<PixelArt>, Failure> {
+    pub fn art(&self, job: &Job, background: [f32; 4], say: &Say) -> Result<Option<Painter>, Failure> {
         if !self.pixel_art {
             return Ok(None);
         }
@@ -86,24 +122,17 @@ impl PixelArgs {
             let n = job.frames.len();
             let few = n.min(PALETTE_FRAMES);
             let spread: Vec<Frame> = (0..few).map(|k| job.frames[k * n / few]).collect();
-            let one = |_: &mut (), w: &mut Worker, f: &Frame| {
+            let one = |w: &mut Worker, f: &Frame| {
                 let mut out = Rgba8::default();
                 job.shot.draw(f.moment, w, &mut out);
                 out
             };
-            draw::frames(
-                job,
-                &spread,
-                say,
-                || (),
-                one,
-                |_, picture| {
-                    samples.push(picture);
-                    Ok(())
-                },
-            )?;
+            draw::frames(job, &spread, say, one, |_, picture| {
+                samples.push(picture);
+                Ok(())
+            })?;
         }
-        Ok(Some(PixelArt::new(desc, &samples, palette)))
+        Ok(Some(Painter { art: PixelArt::new(desc, &samples, palette), mappers: Mutex::default() }))
     }
 }
 

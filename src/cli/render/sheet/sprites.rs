@@ -2,11 +2,11 @@
 
 use super::super::film::Job;
 use super::super::time::Frame;
-use super::{Kind, Pivot, SheetArgs, draw, maps};
+use super::{Kind, Painter, Pivot, SheetArgs, draw, maps};
 use crate::cli::{Failure, say::Say};
 use sinew::frames::{Moment, Worker};
 use sinew::image::Rgba8;
-use sinew::io::picture::{self, AtomicFile, Folder, Indexed, PixelArt, encode_indexed_png, encode_png};
+use sinew::io::picture::{self, AtomicFile, Folder};
 use sinew::io::sheet_json::to_json;
 use sinew::sheet::{
     Canvas, Direction, Distinct, Layout, Limits, Margins, Packing, Rect, Sheet, SheetError, Sprite, Tag,
@@ -40,21 +40,20 @@ pub fn write(
     kind: Kind,
     job: &Job,
     clip: &str,
-    art: Option<&PixelArt>,
     path: &Path,
     say: &Say,
 ) -> Result<(), Failure> {
     let sides = directions(usize::from(args.directions));
     let plan = plan(args, kind, job, &sides);
     let failed = |e: picture::Error| Failure::Run(e.to_string());
-    let (placed, bytes) = match art {
+    let (placed, bytes) = match &job.art {
         Some(art) => indexed(&plan, art, say)?,
         None => colored(&plan, say)?,
     };
     let mut files = vec![(path.to_owned(), bytes.map_err(failed)?)];
     let mut sheet = describe(args, &plan, &placed, clip, &sides, path);
-    sheet.indexed = art.is_some();
-    let (found, drawn) = maps::draw(args, &plan, &placed, art, path, say)?;
+    sheet.indexed = job.art.is_some();
+    let (found, drawn) = maps::draw(args, &plan, &placed, path, say)?;
     sheet.maps = found;
     files.extend(drawn);
     if let Some(style) = args.sheet_json.0 {
@@ -92,46 +91,42 @@ fn plan<'a>(args: &SheetArgs, kind: Kind, job: &'a Job, sides: &[Direction]) -> 
 type Bytes = Result<Vec<u8>, picture::Error>;
 
 fn colored(plan: &Plan, say: &Say) -> Result<(Placed, Bytes), Failure> {
-    let one = |_: &mut (), frame: Rgba8| frame.data.as_chunks::<4>().0.to_vec();
-    let (canvas, layout, cuts) = lay_out(plan, [0u8; 4], || (), one, |p| p[3] > 0, say)?;
+    let one = |frame: Rgba8| frame.data.as_chunks::<4>().0.to_vec();
+    let (canvas, layout, cuts) = lay_out(plan, [0u8; 4], one, |p| p[3] > 0, say)?;
     let alpha = canvas.pixels.iter().map(|p| p[3]).collect();
-    let [width, height] = canvas.size;
-    let picture = Rgba8 { width, height, data: canvas.pixels.into_flattened() };
-    Ok((Placed { layout, cuts, alpha }, encode_png(&picture, plan.job.level)))
+    Ok((Placed { layout, cuts, alpha }, draw::encode(plan.job, canvas)))
 }
 
-fn indexed(plan: &Plan, art: &PixelArt, say: &Say) -> Result<(Placed, Bytes), Failure> {
+fn indexed(plan: &Plan, art: &Painter, say: &Say) -> Result<(Placed, Bytes), Failure> {
     let hole = art.palette().transparent();
-    let one = |mapper: &mut _, frame: Rgba8| art.finish(mapper, &frame).indices;
-    let (canvas, layout, cuts) = lay_out(plan, hole, || art.mapper(), one, |i| *i != hole, say)?;
+    let one = |frame: Rgba8| art.map(&frame).indices;
+    let (canvas, layout, cuts) = lay_out(plan, hole, one, |i| *i != hole, say)?;
     let alpha = canvas.pixels.iter().map(|&i| if i == hole { 0 } else { 255 }).collect();
-    let picture = Indexed { size: canvas.size, indices: canvas.pixels };
-    Ok((Placed { layout, cuts, alpha }, encode_indexed_png(&picture, art.palette(), plan.job.level)))
+    Ok((Placed { layout, cuts, alpha }, draw::encode_indexed(plan.job, canvas, art)))
 }
 
 type LaidOut<P> = (Canvas<P>, Layout, Vec<(usize, Rect)>);
 
 /// Draw all frames, `finish` each on its thread, and find them their places.
-fn lay_out<S, P: Copy + Eq + Hash + Send>(
+fn lay_out<P: Copy + Eq + Hash + Send>(
     plan: &Plan,
     fill: P,
-    state: impl Fn() -> S + Sync,
-    finish: impl Fn(&mut S, Rgba8) -> Vec<P> + Sync,
+    finish: impl Fn(Rgba8) -> Vec<P> + Sync,
     seen: impl Fn(&P) -> bool + Sync,
     say: &Say,
 ) -> Result<LaidOut<P>, Failure> {
     let (job, size, limits) = (plan.job, plan.job.size(), Limits::default());
     let failed = |e: SheetError| Failure::Run(format!("--sheet: {e}"));
-    let drawn = |s: &mut S, w: &mut Worker, f: &Frame| {
+    let drawn = |w: &mut Worker, f: &Frame| {
         let mut out = Rgba8::default();
         job.shot.draw(f.moment, w, &mut out);
-        finish(s, out)
+        finish(out)
     };
     let whole = Rect::whole(size);
     if plan.kind == Kind::Grid {
         let layout = grid(plan.frames.len(), size, plan.columns, plan.margins, limits).map_err(failed)?;
         let mut canvas = Canvas::new(&layout, fill);
-        draw::frames(job, &plan.frames, say, state, drawn, |i, pixels| {
+        draw::frames(job, &plan.frames, say, drawn, |i, pixels| {
             canvas.put(layout.places[i], &pixels, plan.margins.extrude);
             Ok(())
         })?;
@@ -139,12 +134,12 @@ fn lay_out<S, P: Copy + Eq + Hash + Send>(
         return Ok((canvas, layout, cuts));
     }
     let (mut distinct, mut cuts) = (Distinct::new(), Vec::with_capacity(plan.frames.len()));
-    let trimmed = |s: &mut S, w: &mut Worker, f: &Frame| {
-        let pixels = drawn(s, w, f);
+    let trimmed = |w: &mut Worker, f: &Frame| {
+        let pixels = drawn(w, f);
         let trim = visible(&pixels, size[0], &seen);
         (trim, trim.cut(&pixels, size[0]))
     };
-    draw::frames(job, &plan.frames, say, state, trimmed, |i, (trim, pixels)| {
+    draw::frames(job, &plan.frames, say, trimmed, |i, (trim, pixels)| {
         cuts.push((distinct.add(trim.size(), pixels), trim));
         let found = distinct.area();
         if found > limits.pixels {
