@@ -40,7 +40,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Draw a character: one picture, a numbered sequence or a film.
-    Render(render::Args),
+    Render(Box<render::Args>),
     /// Tell what is in a file: bones, meshes, clips, extensions, warnings.
     Info(info::Args),
     /// Print node matrices and vertex positions as JSON.

@@ -1,6 +1,7 @@
 //! Many inputs and clips in one run: names, shares, what is there already, what went wrong, what was written.
 
 use super::film::Written;
+use super::stats::{Form, Totals};
 use super::time::Frame;
 use super::{Args, Plan, Task, draw, list, plan};
 use crate::cli::{Failure, load_posed, print, say, say::Say};
@@ -10,6 +11,7 @@ use sinew::io::{Import, Options};
 use sinew::time::Shard;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 #[derive(clap::Args)]
 #[command(next_help_heading = "Batch")]
@@ -29,6 +31,9 @@ pub struct BatchArgs {
     /// Draw one share of the work, as in 2/4: every 4th frame from the 2nd, or every 4th film.
     #[arg(long, value_name = "K/N", default_value = "1/1")]
     shard: Shard,
+    /// Print what was counted and where the time went.
+    #[arg(long, value_name = "FORM", num_args = 0..=1, require_equals = true, default_missing_value = "text")]
+    pub stats: Option<Form>,
 }
 
 /// A run over all inputs.
@@ -43,6 +48,8 @@ struct Batch<'a> {
     manifest: Manifest,
     failures: Vec<Failure>,
     tasks: usize,
+    totals: Totals,
+    start: Instant,
 }
 
 /// Draw everything that the arguments ask for.
@@ -79,7 +86,8 @@ impl<'a> Batch<'a> {
             keep_inputs(args, path)?;
         }
         let (taken, manifest) = (BTreeMap::new(), Manifest::new());
-        Ok(Self { args, say, template, pieces: 0, taken, manifest, failures: vec![], tasks: 0 })
+        let (failures, totals, start) = (vec![], Totals::default(), Instant::now());
+        Ok(Self { args, say, template, pieces: 0, taken, manifest, failures, tasks: 0, totals, start })
     }
 
     fn run(mut self) -> Result<(), Failure> {
@@ -89,6 +97,9 @@ impl<'a> Batch<'a> {
             }
         }
         self.write_manifest()?;
+        if let Some(form) = self.args.batch.stats {
+            self.totals.print(form, self.start, self.say);
+        }
         self.sum_up()
     }
 
@@ -122,7 +133,9 @@ impl<'a> Batch<'a> {
             return Ok(());
         }
         let textures = !self.args.batch.dry_run;
+        let start = Instant::now();
         let import = load_posed(input, self.args.time.poses.as_ref(), Options { textures }, self.say)?;
+        self.totals.import += start.elapsed();
         let clips = import.asset.character.clips();
         let wanted: Vec<Option<usize>> = match self.args.batch.all_clips {
             true if clips.is_empty() => vec![None],
@@ -143,17 +156,20 @@ impl<'a> Batch<'a> {
             return Ok(false);
         }
         let target = self.target(input, "")?;
-        if matches!(target, Target::Sequence(_)) {
+        if matches!(target, Target::Sequence(..)) {
             return Ok(false);
         }
         if !self.args.batch.shard.has(self.pieces) {
             self.pieces += 1;
             return Ok(true);
         }
-        let there = self.args.batch.skip_existing && target.path_of(1).exists();
-        if there && self.args.batch.manifest.is_none() && !self.args.batch.dry_run {
+        let path = target.path_of(1).filter(|p| self.args.batch.skip_existing && p.exists());
+        if let Some(path) = path
+            && self.args.batch.manifest.is_none()
+            && !self.args.batch.dry_run
+        {
             self.pieces += 1;
-            self.say.note(&format!("kept {}", target.path_of(1).display()));
+            self.say.note(&format!("kept {}", path.display()));
             return Ok(true);
         }
         Ok(false)
@@ -170,7 +186,7 @@ impl<'a> Batch<'a> {
         let clip_name = clip.map(|c| import.asset.character.clips()[c].name.clone());
         let target = self.target(input, clip_name.as_deref().unwrap_or("rest"))?;
         self.claim(input, &clip_name, &target)?;
-        keep_inputs(self.args, &target.path_of(1))?;
+        target.path_of(1).map_or(Ok(()), |path| keep_inputs(self.args, &path))?;
         let task = Task { input, import, clip, target: &target };
         let mut plan = plan(self.args, &task)?;
         self.take_share(&target, &mut plan.frames);
@@ -178,14 +194,15 @@ impl<'a> Batch<'a> {
             return Ok(());
         }
         let all = plan.frames.clone();
-        let there = |f: &Frame| self.args.batch.skip_existing && target.path_of(f.number).exists();
+        let skip = self.args.batch.skip_existing;
+        let there = |f: &Frame| skip && target.path_of(f.number).is_some_and(|p| p.exists());
         plan.frames.retain(|f| !there(f));
         if self.args.batch.dry_run {
             return announce(&task, &plan, all.len());
         }
         let done = match plan.frames.is_empty() {
             true => Written::default(),
-            false => draw(self.args, &task, &plan, self.say)?,
+            false => draw(self.args, &task, &plan, &mut self.totals, self.say)?,
         };
         if plan.frames.len() < all.len() {
             let kept = all.len() - plan.frames.len();
@@ -201,7 +218,7 @@ impl<'a> Batch<'a> {
     /// Leave the frames of this share; a file of many frames is one piece of work.
     fn take_share(&mut self, target: &Target, frames: &mut Vec<Frame>) {
         let (shard, first) = (self.args.batch.shard, self.pieces);
-        if matches!(target, Target::Sequence(_)) {
+        if matches!(target, Target::Sequence(..)) {
             self.pieces += frames.len();
             let mut piece = first..;
             frames.retain(|_| piece.next().is_some_and(|i| shard.has(i)));
@@ -219,7 +236,7 @@ impl<'a> Batch<'a> {
             Some(clip) => format!("clip {clip} of {}", input.display()),
             None => input.display().to_string(),
         };
-        let path = target.path_of(1);
+        let path = target.path_of(1).unwrap_or("-".into());
         match self.taken.get(&path) {
             Some(other) => Err(Failure::Usage(format!(
                 "{}: {other} and {source} would be written there; tell them apart by {{folder}}, {{name}} or {{clip}}",
@@ -244,19 +261,19 @@ impl<'a> Batch<'a> {
         let hash = |path: &Path| {
             manifest::sha256_of_file(path).map_err(|e| Failure::Run(format!("{}: {e}", path.display())))
         };
-        let sequence = matches!(task.target, Target::Sequence(_) | Target::Still(_));
+        let single = !task.target.is_film(all.len());
         let mut drawn: BTreeMap<i64, String> =
             plan.frames.iter().map(|f| f.number).zip(done.hashes).collect();
         let mut frames = vec![];
         for f in all {
-            let file = sequence.then(|| task.target.path_of(f.number));
+            let file = task.target.path_of(f.number).filter(|_| single);
             let sha256 = match (drawn.remove(&f.number), &file) {
                 (None, Some(file)) => Some(hash(file)?),
                 (drawn, _) => drawn,
             };
             frames.push(FrameEntry { frame: f.number, seconds: f.moment.time, file, sha256 });
         }
-        let film = (!sequence).then(|| task.target.path_of(1));
+        let film = task.target.path_of(1).filter(|_| !single);
         self.manifest.outputs.push(Output {
             input: task.input.to_owned(),
             input_sha256: hash(task.input)?,

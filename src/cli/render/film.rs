@@ -2,15 +2,16 @@
 
 use super::time::Frame;
 use crate::cli::{Failure, say::Say};
-use sinew::frames::{FrameStats, Shot, Stop, Worker, in_order};
-use sinew::image::Rgba8;
+use sinew::frames::{FrameStats, Moment, Shot, Stop, Worker, in_order_pairs};
+use sinew::image::{Image, Rgba8};
+use sinew::io::manifest::sha256;
 use sinew::io::picture::{
-    self, ApngWriter, AtomicFile, Film, Folder, Format, GifWriter, Mapper, Palette, PngLevel, Target,
-    choose_dither, encode_png,
+    self, AtomicFile, Coding, ExrDepth, Film, FilmWriter, Folder, Format, FrameEncoder, Output, Palette,
+    PngLevel, Target, choose_dither, encode_exr, encode_png, encode_webp,
 };
 use sinew::time::Rate;
-use std::path::Path;
-use std::time::Instant;
+use std::io::Write;
+use std::time::{Duration, Instant};
 
 /// Frames that a palette is made from.
 const PALETTE_FRAMES: usize = 16;
@@ -29,50 +30,58 @@ pub struct Job<'a> {
     pub hash: bool,
 }
 
-/// What was written.
+/// What was written, and what it cost.
 #[derive(Default)]
 pub struct Written {
     /// A hash a frame, if they were asked for: of its file or, in a film, of its pixels.
     pub hashes: Vec<String>,
-    /// What the last frame cost.
-    pub stats: FrameStats,
+    /// Sums over all frames.
+    pub drawn: FrameStats,
+    /// Bytes of pictures, as they left the encoder.
+    pub bytes: u64,
+    /// Time of encoding, all threads together.
+    pub encode: Duration,
+    /// Time of writing.
+    pub write: Duration,
 }
 
 pub fn write(job: &Job, say: &Say) -> Result<Written, Failure> {
-    // A temporary must not outlive Ctrl-C or a request to terminate; the handler runs on a thread of its own.
-    let _ = ctrlc::set_handler(|| {
-        picture::cleanup_temporaries();
-        std::process::exit(130);
-    });
     refuse_existing(job)?;
-    let start = Instant::now();
-    let stats = match job.target {
-        Target::Still(_) | Target::Sequence(_) => stills(job, say)?,
-        Target::Film(path, Format::Apng) => apng(job, path, say)?,
-        Target::Film(path, _) => gif(job, path, say)?,
+    let film = job.target.is_film(job.frames.len());
+    let drawn = match job.target.format() {
+        _ if film => write_film(job, say),
+        Format::Exr => stills(job, say, shoot_linear, |p| encode_exr(p, ExrDepth::Float)),
+        Format::Webp => stills(job, say, shoot, encode_webp),
+        _ => stills(job, say, shoot, |p| encode_png(p, job.level)),
     };
-    let written = Written { stats, hashes: vec![] };
+    let written = match drawn {
+        // A reader that has seen enough (`| head`) is no failure.
+        Err(Fault::Write(e)) if e.is_closed_pipe() => return Ok(Written::default()),
+        Err(Fault::Write(e)) => return Err(Failure::Run(e.to_string())),
+        Err(Fault::Stopped) => return Err(Failure::Run("drawing stopped".into())),
+        Ok(written) => written,
+    };
     let n = job.frames.len();
-    let seconds = start.elapsed().as_secs_f64();
-    say.detail(&format!(
-        "{n} frames in {seconds:.3} s ({:.2} ms each), a frame: {} bones, {} vertices; {:?}",
-        1e3 * seconds / n as f64,
-        written.stats.bones,
-        written.stats.vertices,
-        written.stats.raster
-    ));
-    say.note(&match job.target {
-        Target::Sequence(_) if n > 1 => {
-            let path = |i: usize| job.target.path_of(job.frames[i].number).display().to_string();
-            format!("wrote {n} frames, {} … {}", path(0), path(n - 1))
+    say.note(&match [0, n - 1].map(|i| job.target.path_of(job.frames[i].number)) {
+        [None, _] => return Ok(written),
+        [Some(first), Some(last)] if first != last => {
+            format!("wrote {n} frames, {} … {}", first.display(), last.display())
         }
-        _ => format!("wrote {}", job.target.path_of(job.frames[0].number).display()),
+        [Some(path), _] => format!("wrote {}", path.display()),
     });
     Ok(written)
 }
 
-fn failed(e: picture::Error) -> Failure {
-    Failure::Run(e.to_string())
+/// Why frames were not written.
+enum Fault {
+    Write(picture::Error),
+    Stopped,
+}
+
+impl From<picture::Error> for Fault {
+    fn from(e: picture::Error) -> Self {
+        Self::Write(e)
+    }
 }
 
 /// Say so before anything is drawn.
@@ -81,7 +90,7 @@ fn refuse_existing(job: &Job) -> Result<(), Failure> {
         return Ok(());
     }
     for frame in job.frames {
-        let path = job.target.path_of(frame.number);
+        let Some(path) = job.target.path_of(frame.number) else { continue };
         if path.exists() {
             let message = format!("{}: the file exists; --force overwrites it", path.display());
             return Err(Failure::Run(message));
@@ -90,134 +99,163 @@ fn refuse_existing(job: &Job) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Draw all moments in parallel, finish each on its worker, and hand the results on in order.
-fn draw<S, T: Send>(
+/// Draws one moment.
+type Shoot<P> = fn(&Shot, Moment, &mut Worker) -> (P, FrameStats);
+
+fn shoot(shot: &Shot, moment: Moment, worker: &mut Worker) -> (Rgba8, FrameStats) {
+    let mut out = Rgba8::default();
+    let stats = shot.draw(moment, worker, &mut out);
+    (out, stats)
+}
+
+fn shoot_linear(shot: &Shot, moment: Moment, worker: &mut Worker) -> (Image, FrameStats) {
+    let mut out = Image::default();
+    let stats = shot.draw_linear(moment, worker, &mut out);
+    (out, stats)
+}
+
+/// Draw moments in parallel, encode each beside the one before on a worker, and hand the results on in order.
+fn draw<P: Send + Sync, S, T: Send>(
     job: &Job,
     frames: &[Frame],
+    shoot: Shoot<P>,
     state: impl Fn() -> S + Sync,
-    finish: impl Fn(&mut S, Rgba8) -> T + Sync,
-    mut receive: impl FnMut(usize, T) -> Result<(), picture::Error>,
-) -> Result<FrameStats, Failure> {
+    encode: impl Fn(&mut S, Option<&P>, &P) -> T + Sync,
+    mut receive: impl FnMut(&mut Written, usize, T) -> Result<(), picture::Error>,
+) -> Result<Written, Fault> {
     let mut fault = None;
-    let mut last = FrameStats::default();
+    let mut written = Written::default();
     let start = || (Worker::default(), state());
-    let one = |(worker, s): &mut (Worker, S), i: usize| {
-        let mut out = Rgba8::default();
-        let stats = job.shot.draw(frames[i].moment, worker, &mut out);
-        (stats, finish(s, out))
+    let first = |(worker, _): &mut (Worker, S), i: usize| shoot(job.shot, frames[i].moment, worker);
+    let second = |(_, s): &mut (Worker, S), before: Option<&(P, FrameStats)>, now: &(P, FrameStats)| {
+        let start = Instant::now();
+        let encoded = encode(s, before.map(|b| &b.0), &now.0);
+        (encoded, now.1, start.elapsed())
     };
-    let done = in_order(frames.len(), job.threads, start, one, |i, (stats, result)| {
-        last = stats;
-        receive(i, result).map_err(|e| {
-            fault = Some(e);
-            Stop
-        })
-    });
+    let done =
+        in_order_pairs(frames.len(), job.threads, start, first, second, |i, (result, stats, encode)| {
+            let start = Instant::now();
+            written.drawn += stats;
+            written.encode += encode;
+            let done = receive(&mut written, i, result);
+            written.write += start.elapsed();
+            done.map_err(|e| {
+                fault = Some(e);
+                Stop
+            })
+        });
     match (done, fault) {
-        (Ok(()), _) => Ok(last),
-        (_, Some(e)) => Err(failed(e)),
-        (Err(Stop), None) => Err(Failure::Run("drawing stopped".into())),
+        (Ok(()), _) => Ok(written),
+        (_, Some(e)) => Err(Fault::Write(e)),
+        (Err(Stop), None) => Err(Fault::Stopped),
     }
 }
 
-fn stills(job: &Job, say: &Say) -> Result<FrameStats, Failure> {
-    let folder = if matches!(job.target, Target::Sequence(_)) { Folder::Create } else { Folder::MustExist };
+/// A picture a frame, each into a file of its own or one after the other to standard output.
+fn stills<P: Send + Sync>(
+    job: &Job,
+    say: &Say,
+    shoot: Shoot<P>,
+    encode: impl Fn(&P) -> Result<Vec<u8>, picture::Error> + Sync,
+) -> Result<Written, Fault> {
+    let folder = if matches!(job.target, Target::Sequence(..)) { Folder::Create } else { Folder::MustExist };
     let bar = say.progress(job.frames.len());
-    let stats = draw(
+    let encode = |(): &mut (), _: Option<&P>, picture: &P| {
+        encode(picture).map(|bytes| (job.hash.then(|| sha256(&bytes)), bytes))
+    };
+    let written = draw(
         job,
         job.frames,
+        shoot,
         || (),
-        |(), picture| encode_png(&picture, job.level),
-        |i, png| {
-            let path = job.target.path_of(job.frames[i].number);
-            AtomicFile::write(path, &png?, job.force, folder)?;
+        encode,
+        |written, i, result| {
+            let (hash, bytes) = result?;
+            written.hashes.extend(hash);
+            written.bytes += bytes.len() as u64;
+            match job.target.path_of(job.frames[i].number) {
+                Some(path) => AtomicFile::write(path, &bytes, job.force, folder)?,
+                None => {
+                    let mut out = Output::stdout(false);
+                    out.write_all(&bytes).map_err(|source| picture::Error::Stdout { source })?;
+                    out.commit()?;
+                }
+            }
             bar.inc(1);
             Ok(())
         },
     );
     bar.finish_and_clear();
-    stats
+    written
 }
 
-fn film(job: &Job) -> Film {
-    Film {
-        size: [job.shot.desc().settings.width, job.shot.desc().settings.height],
-        frames: job.frames.len() as u32,
-        rate: job.rate,
-        plays: 0,
-        transparent: job.transparent,
-        matte: [255; 3],
-    }
-}
-
-fn apng(job: &Job, path: &Path, say: &Say) -> Result<FrameStats, Failure> {
-    let mut file = AtomicFile::create(path, job.force, Folder::MustExist).map_err(failed)?;
-    let mut writer = ApngWriter::new(&mut file, film(job), job.level).map_err(failed)?;
+/// All frames into one file.
+fn write_film(job: &Job, say: &Say) -> Result<Written, Fault> {
+    let settings = &job.shot.desc().settings;
+    let size = [settings.width, settings.height];
+    let film = Film { transparent: job.transparent, ..Film::new(size, job.frames.len() as u32, job.rate) };
+    let format = job.target.format();
+    // WebP goes back to its head, which a pipe cannot.
+    let mut out = match job.target.path_of(0) {
+        Some(path) => Output::file(path, job.force, Folder::MustExist)?,
+        None => Output::stdout(format == Format::Webp),
+    };
+    let coding = match format {
+        Format::Gif => gif_coding(job, &film, say)?,
+        Format::Webp => Coding::Webp,
+        Format::Y4m => Coding::Y4m,
+        _ => Coding::Apng(job.level),
+    };
+    let mut writer = FilmWriter::new(&mut out, film, &coding)?;
     let bar = say.progress(job.frames.len());
-    let stats = draw(
-        job,
-        job.frames,
-        || (),
-        |(), picture| picture,
-        |_, picture| {
-            bar.inc(1);
-            writer.write(&picture)
-        },
-    )?;
+    let encode = |encoder: &mut FrameEncoder, before: Option<&Rgba8>, now: &Rgba8| {
+        let hash = job.hash.then(|| sha256(&now.data));
+        encoder.encode(before, now).map(|frame| (hash, frame))
+    };
+    let state = || FrameEncoder::new(film, &coding);
+    let mut written = draw(job, job.frames, shoot, state, encode, |written, _, result| {
+        let (hash, frame) = result?;
+        written.hashes.extend(hash);
+        bar.inc(1);
+        writer.write(frame)
+    })?;
     bar.finish_and_clear();
-    writer.finish().map_err(failed)?;
-    file.commit().map_err(failed)?;
-    Ok(stats)
+    let report = writer.finish()?;
+    if report.dropped > 0 {
+        let dropped = report.dropped;
+        say.note(&format!(
+            "{dropped} frames were too short for GIF; the film's length is right without them"
+        ));
+    }
+    written.bytes = std::io::Seek::stream_position(&mut out).unwrap_or(0);
+    out.commit()?;
+    Ok(written)
 }
 
-fn gif(job: &Job, path: &Path, say: &Say) -> Result<FrameStats, Failure> {
-    let film = film(job);
-    let mut file = AtomicFile::create(path, job.force, Folder::MustExist).map_err(failed)?;
-
-    // A few frames, spread over the film, decide on its colours and its dithering.
+/// The palette and the dithering of a GIF: a few frames, spread over the film, decide.
+fn gif_coding(job: &Job, film: &Film, say: &Say) -> Result<Coding, Fault> {
     let n = job.frames.len();
     let few = n.min(PALETTE_FRAMES);
     let spread: Vec<Frame> = (0..few).map(|k| job.frames[k * n / few]).collect();
     let mut samples = Vec::with_capacity(few);
+    let keep = |(): &mut (), _: Option<&Rgba8>, picture: &Rgba8| picture.clone();
     draw(
         job,
         &spread,
+        shoot,
         || (),
-        |(), picture| picture,
-        |_, picture| {
+        keep,
+        |_, _, picture| {
             samples.push(picture);
             Ok(())
         },
     )?;
-    let palette = Palette::from_frames(&samples, 256, &film);
-    let (dither, scores) = choose_dither(&samples, &palette, &film);
-    drop(samples);
+    let palette = Palette::from_frames(&samples, 256, film);
+    let (dither, scores) = choose_dither(&samples, &palette, film);
     for s in scores {
         let chosen = if s.dither == dither { ", chosen" } else { "" };
         let name = s.dither.name();
         say.detail(&format!("dithering {name}: error {:.3}, flicker {:.3}{chosen}", s.error, s.flicker));
     }
-
-    let mut writer = GifWriter::new(&mut file, film, &palette, dither).map_err(failed)?;
-    let bar = say.progress(n);
-    let stats = draw(
-        job,
-        job.frames,
-        || Mapper::new(&palette, &film),
-        |mapper, picture| mapper.map(&picture, dither),
-        |_, indexed| {
-            bar.inc(1);
-            writer.write_indexed(indexed)
-        },
-    )?;
-    bar.finish_and_clear();
-    let (_, report) = writer.finish().map_err(failed)?;
-    if report.dropped > 0 {
-        say.note(&format!(
-            "{} frames were too short for GIF; the film's length is right without them",
-            report.dropped
-        ));
-    }
-    file.commit().map_err(failed)?;
-    Ok(stats)
+    Ok(Coding::Gif(palette, dither))
 }

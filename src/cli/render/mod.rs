@@ -8,6 +8,7 @@ mod look;
 mod output;
 mod overlay;
 mod sheet;
+mod stats;
 mod time;
 
 use super::{Failure, print, say, say::Say};
@@ -18,7 +19,9 @@ use sinew::io::Import;
 use sinew::io::picture::Target;
 use sinew::render::Settings;
 use sinew::time::Range;
+use stats::Totals;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 use time::Frame;
 
 const EXAMPLES: &str = "\
@@ -63,6 +66,11 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
+    // A temporary must not outlive Ctrl-C or a request to terminate; the handler runs on a thread of its own.
+    let _ = ctrlc::set_handler(|| {
+        sinew::io::picture::cleanup_temporaries();
+        std::process::exit(130);
+    });
     batch::run(args, say)
 }
 
@@ -83,7 +91,7 @@ struct Plan {
 fn plan(args: &Args, task: &Task) -> Result<Plan, Failure> {
     let clips = task.import.asset.character.clips();
     let range = task.clip.map_or(Range::default(), |c| clips[c].playback());
-    let alone = matches!(task.target, Target::Still(_));
+    let alone = !task.target.takes_a_clip();
     let frames = args.time.frames(task.input, range, alone, args.camera.turntable)?;
     task.target.check_frames(frames.len()).map_err(|e| Failure::Usage(e.to_string()))?;
     let settings = args.output.settings()?;
@@ -91,7 +99,7 @@ fn plan(args: &Args, task: &Task) -> Result<Plan, Failure> {
 }
 
 /// Draw the frames of a plan and write them.
-fn draw(args: &Args, task: &Task, plan: &Plan, say: &Say) -> Result<Written, Failure> {
+fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -> Result<Written, Failure> {
     let asset = &task.import.asset;
     let character = &asset.character;
     if character.instances().iter().all(|i| character.mesh(i).triangles.is_empty()) {
@@ -112,22 +120,27 @@ fn draw(args: &Args, task: &Task, plan: &Plan, say: &Say) -> Result<Written, Fai
         wrap: args.time.wrap(args.camera.turntable),
         view: args.camera.view(asset)?,
         framing: args.camera.framing(asset)?,
-        look: args.look.look(asset)?,
+        look: args.look.look(asset, |m| say.warn(m))?,
+        overlays: args.overlay.overlays(asset, args.time.fps)?,
         settings,
     };
+    let start = Instant::now();
     let shot = Shot::new(asset, desc).map_err(|e| Failure::Usage(e.to_string()))?;
+    totals.framing += start.elapsed();
     let job = Job {
         shot: &shot,
         frames: &plan.frames,
         rate: args.time.fps,
-        transparent: args.look.transparent(),
+        transparent: look::transparent(&shot.desc().look),
         target: task.target,
         level: args.output.png,
         threads,
         force: args.output.force,
         hash: args.batch.manifest.is_some(),
     };
-    film::write(&job, say)
+    let written = film::write(&job, say)?;
+    totals.add(&written, plan.frames.len());
+    Ok(written)
 }
 
 fn list(asset: &Asset) -> Result<(), Failure> {

@@ -7,8 +7,8 @@ use sinew::render::Settings;
 #[derive(clap::Args)]
 #[command(next_help_heading = "Output")]
 pub struct OutputArgs {
-    /// A picture (.png), a numbered sequence (out.####.png, out.%04d.png) or a film (.gif, .apng); of several inputs or clips with
-    /// {name}, {folder} and {clip} in it.
+    /// A picture (.png, .webp, .exr), a numbered sequence (out.####.png, out.%04d.png), a film (.webp, .gif, .apng, .y4m) or - for
+    /// standard output; of several inputs or clips with {name}, {folder} and {clip} in it.
     #[arg(short, long, value_name = "OUT", required_unless_present = "list")]
     output: Option<String>,
     /// Pixels, as in 512 or 1920x1080.
@@ -20,8 +20,11 @@ pub struct OutputArgs {
     /// How hard to press PNG files: fast, balanced or best.
     #[arg(long, default_value = "fast", value_parser = parse_level)]
     pub png: PngLevel,
+    /// The format, for standard output (-o -) or an animated PNG whose name ends in .png: png, webp, exr, gif, apng or y4m.
+    #[arg(long, value_name = "FORMAT")]
+    format: Option<Format>,
     /// Write an animated PNG even though the name ends in .png.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "format")]
     apng: bool,
     /// Worker threads; 0 takes one a processor. The result does not depend on it.
     #[arg(long, default_value = "0", value_name = "N")]
@@ -39,7 +42,11 @@ impl OutputArgs {
 
     /// What a name asks for.
     pub fn target(&self, name: &str) -> Result<Target, Failure> {
-        let target = if self.apng { Target::parse_as(name, Format::Apng) } else { Target::parse(name) };
+        let format = self.format.or(self.apng.then_some(Format::Apng));
+        let target = match format {
+            Some(format) => Target::parse_as(name, format),
+            None => Target::parse(name),
+        };
         target.map_err(|e| Failure::Usage(e.to_string()))
     }
 

@@ -1,5 +1,6 @@
 //! What a run did and where its time went.
 
+use super::film::Written;
 use crate::cli::say::Say;
 use sinew::frames::FrameStats;
 use std::time::{Duration, Instant};
@@ -35,6 +36,16 @@ pub struct Totals {
 }
 
 impl Totals {
+    /// Take in an output.
+    pub fn add(&mut self, written: &Written, frames: usize) {
+        self.outputs += 1;
+        self.frames += frames;
+        self.bytes += written.bytes;
+        self.encode += written.encode;
+        self.write += written.write;
+        self.drawn += written.drawn;
+    }
+
     /// Print what was counted since `start`.
     pub fn print(&self, form: Form, start: Instant, say: &Say) {
         let wall = start.elapsed();
@@ -66,7 +77,9 @@ impl Totals {
             Form::Text => {
                 counts.iter().for_each(|(name, n)| say.report(&format!("{name:<20}{n:>14}")));
                 let ms = |t: &Duration| 1e3 * t.as_secs_f64();
-                times.iter().for_each(|(name, t)| say.report(&format!("{:<20}{:>14.3}", format!("ms {name}"), ms(t))));
+                times.iter().for_each(|(name, t)| {
+                    say.report(&format!("{:<20}{:>14.3}", format!("ms {name}"), ms(t)))
+                });
             }
             Form::Json => {
                 let key = |name: &str| name.replace(' ', "_");

@@ -4,7 +4,7 @@ use super::Error;
 use super::unnamed;
 use std::collections::BTreeSet;
 use std::fs;
-use std::io::{self, Write};
+use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -87,6 +87,12 @@ impl Write for Temporary {
 
     fn flush(&mut self) -> io::Result<()> {
         self.file().flush()
+    }
+}
+
+impl Seek for Temporary {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file().seek(to)
     }
 }
 
@@ -175,6 +181,13 @@ impl Write for AtomicFile {
     fn flush(&mut self) -> io::Result<()> {
         let file = self.file.as_mut().ok_or(io::ErrorKind::NotConnected)?;
         file.flush().map_err(name_file(&self.path))
+    }
+}
+
+impl Seek for AtomicFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        let file = self.file.as_mut().ok_or(io::ErrorKind::NotConnected)?;
+        file.seek(to).map_err(name_file(&self.path))
     }
 }
 

@@ -40,6 +40,11 @@ impl Rect {
         }
     }
 
+    /// The same rectangle, its left and upper side moved outwards to even pixels.
+    pub fn even(self) -> Self {
+        Self { left: self.left & !1, top: self.top & !1, ..self }
+    }
+
     /// Where each row starts and ends in a buffer of `width` pixels a row.
     pub fn rows(&self, width: usize) -> impl Iterator<Item = std::ops::Range<usize>> + use<> {
         let Self { left, right, .. } = *self;
@@ -47,8 +52,13 @@ impl Rect {
     }
 }
 
-/// The smallest rectangle that holds every pixel where `differs(before, after)`.
-pub(super) fn bounds<T>(
+/// The smallest rectangle that holds every pixel that differs.
+pub(super) fn bounds<T: PartialEq>(before: &[T], after: &[T], width: usize) -> Option<Rect> {
+    bounds_where(before, after, width, |a, b| a != b)
+}
+
+/// The smallest rectangle that holds every pixel where `differs(before, after)`; it must not where both are equal.
+pub(super) fn bounds_where<T: PartialEq>(
     before: &[T],
     after: &[T],
     width: usize,
@@ -56,6 +66,10 @@ pub(super) fn bounds<T>(
 ) -> Option<Rect> {
     let mut rect: Option<Rect> = None;
     for (y, (a, b)) in before.chunks_exact(width).zip(after.chunks_exact(width)).enumerate() {
+        // Whole rows compare many pixels at a time, and most rows of most films stand still.
+        if a == b {
+            continue;
+        }
         let differs = |x: &usize| differs(&a[*x], &b[*x]);
         let Some(left) = (0..width).find(differs) else { continue };
         let right = (0..width).rfind(differs).map_or(left, |x| x) + 1;
@@ -73,9 +87,9 @@ mod tests {
     fn the_rectangle_is_tight() {
         let before = [0u8; 20];
         let mut after = before;
-        assert_eq!(bounds(&before, &after, 5, |a, b| a != b), None);
+        assert_eq!(bounds(&before, &after, 5), None);
         (after[7], after[13]) = (1, 1);
-        let rect = bounds(&before, &after, 5, |a, b| a != b).unwrap();
+        let rect = bounds(&before, &after, 5).unwrap();
         assert_eq!(rect, Rect { left: 2, top: 1, right: 4, bottom: 3 });
         assert_eq!(rect.rows(5).collect::<Vec<_>>(), [7..9, 12..14]);
     }

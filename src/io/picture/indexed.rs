@@ -83,7 +83,7 @@ pub fn encode_data_png(size: [usize; 2], data: Data, level: PngLevel) -> Result<
     let mut encoder = ::png::Encoder::new(&mut out, size[0] as u32, size[1] as u32);
     encoder.set_color(color);
     encoder.set_depth(depth);
-    level.apply(&mut encoder);
+    encoder.set_compression(level.compression());
     finish(encoder, &bytes)?;
     Ok(out)
 }
@@ -104,7 +104,7 @@ fn encode_palette(
     if let Some(alpha) = alpha {
         encoder.set_trns(alpha);
     }
-    level.apply(&mut encoder);
+    encoder.set_compression(level.compression());
     // Differences of indices mean nothing.
     encoder.set_filter(::png::Filter::NoFilter);
     finish(encoder, indices)?;
@@ -116,5 +116,5 @@ fn finish(encoder: ::png::Encoder<'_, &mut Vec<u8>>, bytes: &[u8]) -> Result<(),
         w.write_image_data(bytes)?;
         w.finish()
     });
-    written.map_err(|e| failed("PNG", e))
+    written.map_err(failed)
 }
