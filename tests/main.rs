@@ -5,6 +5,8 @@ mod architecture;
 mod batch;
 #[cfg(feature = "cli")]
 mod cli;
+#[cfg(feature = "cli")]
+mod compare;
 #[cfg(all(feature = "io", feature = "pictures"))]
 mod corpus;
 mod deform;

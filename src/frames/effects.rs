@@ -9,7 +9,7 @@ use crate::render::backdrop::{Backdrop, Ground};
 use crate::render::footprint::Footprint;
 use crate::render::raster::{IdImage, Rasterizer, Stats};
 use crate::render::shadow::{ShadowDesc, ShadowMaker};
-use crate::scene::{AlphaMode, LightKind, Material, Projection, Scene, ShadowMap};
+use crate::scene::{AlphaMode, Camera, LightKind, Material, Projection, Scene, ShadowMap};
 use glam::Vec3;
 
 /// Pixels along a side for each pixel of the picture, where tones and lines have edges that samples do not smooth.
@@ -72,7 +72,7 @@ impl Stage {
         (0.5 * self.bounds[0].distance(self.bounds[1])).max(1e-9)
     }
 
-    /// Draw a scene with all that the look wants.
+    /// Draw a scene with all that the look wants, before nothing.
     pub fn draw(
         &self,
         desc: &ShotDesc,
@@ -85,7 +85,7 @@ impl Stage {
         let caster = Scene { materials: &self.solid, ..scene.clone() };
         let mut stats = self.shadows(look, settings, &caster, effects);
         let mut scene = Scene { background: [0.0; 4], ..scene.clone() };
-        let Effects { key, cast, contact, fine, ids, .. } = effects;
+        let Effects { key, fine, ids, .. } = effects;
         if look.shadows == Shadows::Map && key.size > 0 {
             scene.style.shadow = Some(key);
         }
@@ -99,14 +99,18 @@ impl Stage {
             stats += self.figure(look, &scene, &caster, &large, finer as f32, rasterizer, ids, fine);
             average(fine, finer, out);
         }
+        stats
+    }
 
+    /// Put background and ground, with the shadows of the last scene that was drawn, behind a picture.
+    pub fn put_behind(&self, look: &Look, camera: &Camera, effects: &Effects, out: &mut Image) {
+        let Effects { cast, contact, .. } = effects;
         let backdrop = Backdrop {
             top: look.background,
             bottom: look.background_bottom.unwrap_or(look.background),
             ground: look.ground.map(|g| self.ground(g, contact, cast)),
         };
-        backdrop.put_behind(&scene.camera, out);
-        stats
+        backdrop.put_behind(camera, out);
     }
 
     /// The ground around the character.

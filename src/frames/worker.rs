@@ -19,8 +19,9 @@ pub struct Worker {
     pub(super) deformed: Vec<Deformed>,
     pub(super) rasterizer: Rasterizer,
     pub(super) effects: Effects,
-    /// A picture on its way to 8 bits.
+    /// A picture on its way to 8 bits, and one that is put on it.
     pub(super) light: Image,
+    pub(super) layer: Image,
 }
 
 impl Worker {

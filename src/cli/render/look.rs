@@ -153,7 +153,7 @@ fn opaque(code: u32) -> [f32; 4] {
 }
 
 /// `#rrggbb` as linear RGBA.
-fn parse_color(text: &str) -> Option<[f32; 4]> {
+pub fn parse_color(text: &str) -> Option<[f32; 4]> {
     let hex =
         text.trim().strip_prefix('#').filter(|h| h.len() == 6 && h.bytes().all(|b| b.is_ascii_hexdigit()));
     hex.and_then(|h| u32::from_str_radix(h, 16).ok()).map(opaque)

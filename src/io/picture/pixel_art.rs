@@ -78,6 +78,11 @@ impl PixelArt {
         &self.palette
     }
 
+    /// Whether a line runs around the character.
+    pub fn is_outlined(&self) -> bool {
+        self.outline.is_some()
+    }
+
     /// A mapper for [`finish`](Self::finish): one a thread.
     pub fn mapper(&self) -> Mapper {
         Mapper::new(&self.palette, &film(self.matte, [0; 2]))
