@@ -12,6 +12,8 @@ mod corpus;
 mod deform;
 #[cfg(feature = "io")]
 mod gltf;
+#[cfg(feature = "io")]
+mod looks;
 #[cfg(feature = "pictures")]
 mod picture;
 mod raster;
