@@ -21,3 +21,5 @@ mod raster;
 mod rng;
 #[cfg(all(feature = "io", feature = "pictures"))]
 mod shots;
+#[cfg(all(feature = "io", feature = "pictures"))]
+mod views;
