@@ -88,6 +88,14 @@ fn packed_frames_do_not_overlap_and_the_sheet_is_not_much_larger_than_they_are()
 }
 
 #[test]
+fn thousands_of_frames_are_packed() {
+    let sizes: Vec<[usize; 2]> = (0..2000).map(|i| [1 + i % 3, 1 + i % 2 * 9]).collect();
+    let layout = pack(&sizes, Packing::default()).unwrap();
+    let area: usize = sizes.iter().map(|s| s[0] * s[1]).sum();
+    assert!(area as f64 > 0.9 * (layout.size[0] * layout.size[1]) as f64, "{:?}", layout.size);
+}
+
+#[test]
 fn a_grid_has_its_frames_in_rows() {
     let margins = Margins { between: 3, around: 2, extrude: 1 };
     let layout = grid(10, [8, 5], 4, margins, Limits::default()).unwrap();
