@@ -122,6 +122,8 @@ pub mod render;
 
 pub mod frames;
 
+pub mod measure;
+
 #[cfg(feature = "pictures")]
 pub mod sheet;
 

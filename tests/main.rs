@@ -6,6 +6,8 @@ mod batch;
 mod channels;
 #[cfg(feature = "cli")]
 mod cli;
+#[cfg(feature = "cli")]
+mod compare;
 #[cfg(all(feature = "io", feature = "pictures"))]
 mod corpus;
 mod deform;

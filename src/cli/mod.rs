@@ -1,5 +1,6 @@
 //! The command line: parse, call the library, print, choose an exit code. No algorithm lives here.
 
+mod compare;
 mod eval;
 mod info;
 mod manifest;
@@ -44,6 +45,8 @@ enum Command {
     Info(info::Args),
     /// Print node matrices and vertex positions as JSON.
     Eval(eval::Args),
+    /// Tell how far pictures or films are from what they should be.
+    Compare(compare::Args),
     /// Merge and check lists of what was written.
     Manifest(manifest::Args),
     /// Print a completion script for a shell.
@@ -109,6 +112,7 @@ pub fn run() -> ExitCode {
         Command::Render(args) => render::run(&args, &say),
         Command::Info(args) => info::run(&args, &say),
         Command::Eval(args) => eval::run(&args, &say),
+        Command::Compare(args) => compare::run(&args, &say),
         Command::Manifest(args) => manifest::run(&args, &say),
         Command::Completions { shell } => completions(shell),
         Command::Man { subcommand } => manual(subcommand.as_deref()),

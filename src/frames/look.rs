@@ -2,6 +2,8 @@
 
 use crate::asset::{Asset, MountedLight};
 use crate::fk::Posed;
+use crate::image::develop::Grade;
+use crate::render::outline::Outline;
 use crate::scene::{Camera, Lamp, Light, LightKind, Lighting, Material, MaterialPatch, Style};
 use glam::{Affine3A, DVec3, Vec3};
 
@@ -17,20 +19,63 @@ pub enum Shading {
     Facets,
 }
 
+/// What throws shadows on what.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Shadows {
+    /// Nothing on nothing.
+    #[default]
+    None,
+    /// What is near the ground darkens it softly, wherever the lamps stand.
+    Contact,
+    /// The key light, the first lamp, throws shadows on the ground and on the character itself, and what is near the ground
+    /// darkens it a little. A lamp that is no sun throws them as if it were one in its direction from the character's middle.
+    Map,
+}
+
+/// The plane below the lowest point of the whole clip.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct GroundLook {
+    /// Linear RGB; it fades into the background with distance. `None` is seen by its shadows alone: black, with their darkness as
+    /// alpha.
+    pub color: Option<Vec3>,
+}
+
 /// What a shot has of its own beside the asset's materials.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Look {
     /// Linear RGBA behind everything, alpha premultiplied.
     pub background: [f32; 4],
+    /// The same at the picture's bottom, if it changes on the way down; between the two, sRGB values run straight.
+    pub background_bottom: Option<[f32; 4]>,
     /// All light; `None` is the asset's lamps, or a key and a fill light that stand with the camera where it has none.
     pub lighting: Option<Lighting>,
     /// How surfaces are shaded.
     pub shading: Shading,
+    /// Contours.
+    pub outline: Option<Outline>,
+    /// What the character stands on; seen from above only.
+    pub ground: Option<GroundLook>,
+    /// What throws shadows.
+    pub shadows: Shadows,
     /// Changes of the asset's materials, in order.
     pub materials: Vec<MaterialPatch>,
+    /// How light becomes 8 bits.
+    pub grade: Grade,
 }
 
 impl Look {
+    /// Whether the rasterizer's own bytes are the picture.
+    pub(super) fn is_direct(&self) -> bool {
+        self.grade.is_plain() && !self.needs_stage()
+    }
+
+    /// Whether there is more to a picture than its scene.
+    pub(super) fn needs_stage(&self) -> bool {
+        let toon = matches!(self.shading, Shading::Toon(_));
+        let ground = self.ground.is_some() || self.shadows == Shadows::Map;
+        toon || ground || self.outline.is_some() || self.background_bottom.is_some()
+    }
+
     /// Steps of the tone ramp.
     pub(super) fn tones(&self) -> Option<u32> {
         match self.shading {
@@ -88,7 +133,7 @@ pub(super) fn lights(
 
 /// A lamp in the scene's frame.
 fn placed(lamp: &Lamp, center: DVec3, camera: &Camera) -> Light {
-    let frame = Affine3A::from_mat3_translation(lamp.stand.axes(camera), -center.as_vec3());
+    let frame = Affine3A::from_mat3_translation(lamp.frame.axes(camera), -center.as_vec3());
     lamp.light.carried(&frame)
 }
 

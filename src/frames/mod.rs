@@ -1,18 +1,25 @@
 //! Times to pictures: the one place where animation meets rendering.
 
+mod bones;
 mod channels;
+mod effects;
 mod fit;
 mod framing;
 mod look;
+mod onion;
 mod ordered;
+mod overlay;
+mod path;
 mod pivot;
 mod stand;
+mod stroke;
 mod view;
 mod worker;
 
 pub use framing::{Framing, Turns};
-pub use look::{Look, Shading};
+pub use look::{GroundLook, Look, Shading, Shadows};
 pub use ordered::{Stop, in_order, in_order_pairs};
+pub use overlay::{BonesDesc, Onion, Overlays, PathDesc};
 pub use pivot::ground_point;
 pub use view::{FramingDesc, Pivot, View, ViewError};
 pub use worker::Worker;
@@ -20,14 +27,17 @@ pub use worker::Worker;
 use crate::asset::Asset;
 use crate::character::Instance;
 use crate::fk::Posed;
+use crate::image::develop::Developer;
 use crate::image::{Image, Rgba8};
 use crate::render::Settings;
 use crate::render::raster::{IdImage, Stats};
-use crate::scene::{Material, Object, Scene};
+use crate::scene::{Camera, Material, Object, Scene};
 use crate::skin::Deformed;
 use crate::time::{self, Range, Wrap};
+use effects::Stage;
 use fit::Span;
 use glam::DVec3;
+use overlay::Layers;
 use stand::Stand;
 use std::time::{Duration, Instant};
 
@@ -44,6 +54,8 @@ pub struct ShotDesc {
     pub framing: FramingDesc,
     /// Light and background.
     pub look: Look,
+    /// What is drawn with the character.
+    pub overlays: Overlays,
     /// Size and samples of the pictures.
     pub settings: Settings,
 }
@@ -57,6 +69,7 @@ impl Default for ShotDesc {
             view: View::default(),
             framing: FramingDesc::default(),
             look: Look::default(),
+            overlays: Overlays::default(),
             settings: Settings::default(),
         }
     }
@@ -85,11 +98,15 @@ pub struct Shot<'a> {
     asset: &'a Asset,
     desc: ShotDesc,
     stand: Stand<'a>,
+    layers: Layers,
     range: Range,
     /// The asset's materials, and the one that meshes without a material wear.
     materials: Vec<Material>,
     /// The world point that the scene's frame has its origin at.
     center: DVec3,
+    /// What the look needs beside the scene itself.
+    stage: Option<Stage>,
+    developer: Developer,
 }
 
 /// What a frame cost.
@@ -139,15 +156,17 @@ impl<'a> Shot<'a> {
     /// If the asset has no such clip.
     pub fn new(asset: &'a Asset, desc: ShotDesc) -> Result<Self, ViewError> {
         let materials = look::materials(asset, &desc.look);
-        let settings = &desc.settings;
-        let aspect = settings.width as f32 / settings.height.max(1) as f32;
+        let aspect = aspect(&desc.settings);
         let range = desc.clip.map(|c| asset.character.clips()[c].playback()).unwrap_or_default();
         let mut worker = Worker::default();
         worker.evaluate(asset, desc.clip, range.start);
         let center = asset.character.center(&worker.posed);
         let span = Span { asset, clip: desc.clip, center };
         let stand = Stand::new(&span, &desc.view, desc.framing, aspect, &mut worker)?;
-        Ok(Self { asset, desc, stand, range, materials, center })
+        let stage = Stage::new(&span, &desc.look, &materials, &mut worker);
+        let layers = Layers::new(&span, &desc.overlays, &mut worker)?;
+        let developer = desc.look.grade.developer();
+        Ok(Self { asset, desc, stand, range, materials, center, stage, layers, developer })
     }
 
     /// What was asked for.
@@ -173,12 +192,20 @@ impl<'a> Shot<'a> {
 
     /// Draw a moment with the buffers of `worker`.
     pub fn draw(&self, moment: impl Into<Moment>, worker: &mut Worker, out: &mut Rgba8) -> FrameStats {
-        self.with_scene(moment.into(), worker, |scene, w| w.draw(scene, &self.desc.settings, out))
+        if self.desc.look.is_direct() && self.desc.overlays.is_empty() {
+            return self
+                .with_scene(moment.into(), worker, |scene, w| w.draw(scene, &self.desc.settings, out));
+        }
+        let mut light = std::mem::take(&mut worker.light);
+        let stats = self.draw_linear(moment, worker, &mut light);
+        self.developer.develop(&light, out);
+        worker.light = light;
+        stats
     }
 
-    /// Draw a moment in linear light, alpha premultiplied.
+    /// Draw a moment in linear light, alpha premultiplied. The look's grade is not applied.
     pub fn draw_linear(&self, moment: impl Into<Moment>, worker: &mut Worker, out: &mut Image) -> FrameStats {
-        self.with_scene(moment.into(), worker, |scene, w| w.draw_linear(scene, &self.desc.settings, out))
+        self.draw_layers(moment.into(), worker, out)
     }
 
     /// Which object and triangle is seen at the centre of each pixel of a moment, and how far away.
@@ -195,19 +222,34 @@ impl<'a> Shot<'a> {
         worker: &mut Worker,
         draw: impl FnOnce(&Scene, &mut crate::render::raster::Rasterizer) -> Stats,
     ) -> FrameStats {
+        let mut stats = FrameStats::default();
+        self.pose(moment.time, worker, &mut stats);
         let start = Instant::now();
-        worker.evaluate(self.asset, self.desc.clip, time::wrap(moment.time, self.range, self.desc.wrap));
-        let posed = Instant::now();
-        worker.deform(self.asset, self.center);
-        let deformed = Instant::now();
-        let scene = self.scene(moment, &worker.posed, &worker.deformed);
-        let raster = draw(&scene, &mut worker.rasterizer);
-        let vertices = worker.deformed.iter().map(|d| d.positions.len()).sum();
-        let times = Times { pose: posed - start, deform: deformed - posed, draw: deformed.elapsed() };
-        FrameStats { bones: worker.posed.len(), vertices, raster, times }
+        let camera = self.stand.camera(moment, &worker.posed, &worker.deformed);
+        let scene = self.scene(camera, &worker.posed, &worker.deformed);
+        stats.raster = draw(&scene, &mut worker.rasterizer);
+        stats.times.draw = start.elapsed();
+        stats
     }
 
-    fn scene<'s>(&'s self, moment: Moment, posed: &Posed, deformed: &'s [Deformed]) -> Scene<'s> {
+    /// Pose and deform the character.
+    fn pose(&self, time: f64, worker: &mut Worker, stats: &mut FrameStats) {
+        let start = Instant::now();
+        worker.evaluate(self.asset, self.desc.clip, time::wrap(time, self.range, self.desc.wrap));
+        let posed = Instant::now();
+        worker.deform(self.asset, self.center);
+        stats.bones += worker.posed.len();
+        stats.vertices += worker.deformed.iter().map(|d| d.positions.len()).sum::<usize>();
+        stats.times.pose += posed - start;
+        stats.times.deform += posed.elapsed();
+    }
+
+    /// Width over height.
+    fn aspect(&self) -> f32 {
+        aspect(&self.desc.settings)
+    }
+
+    fn scene<'s>(&'s self, camera: Camera, posed: &Posed, deformed: &'s [Deformed]) -> Scene<'s> {
         let character = &self.asset.character;
         let plain = self.materials.len() - 1;
         let object = |(inst, d): (&Instance, &'s Deformed)| {
@@ -222,7 +264,6 @@ impl<'a> Shot<'a> {
                 mirrored: d.mirrored,
             }
         };
-        let camera = self.stand.camera(moment, posed, deformed);
         let look = &self.desc.look;
         let lit = look::lights(look, &self.asset.lights, posed, self.center, &camera);
         Scene {
@@ -236,4 +277,9 @@ impl<'a> Shot<'a> {
             textures: &self.asset.textures,
         }
     }
+}
+
+/// Width over height of a picture.
+fn aspect(settings: &Settings) -> f32 {
+    settings.width as f32 / settings.height.max(1) as f32
 }

@@ -1,8 +1,10 @@
 //! What one thread works with.
 
+use super::effects::Effects;
 use crate::asset::Asset;
 use crate::character::Scratch;
 use crate::fk::{self, Posed};
+use crate::image::Image;
 use crate::pose::Pose;
 use crate::render::raster::Rasterizer;
 use crate::skin::Deformed;
@@ -16,6 +18,10 @@ pub struct Worker {
     pub(super) scratch: Scratch,
     pub(super) deformed: Vec<Deformed>,
     pub(super) rasterizer: Rasterizer,
+    pub(super) effects: Effects,
+    /// A picture on its way to 8 bits, and one that is put on it.
+    pub(super) light: Image,
+    pub(super) layer: Image,
 }
 
 impl Worker {

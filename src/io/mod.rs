@@ -2,6 +2,10 @@
 
 #[cfg(feature = "io")]
 pub mod gltf;
+#[cfg(feature = "io")]
+mod json_color;
+#[cfg(feature = "io")]
+pub mod look_json;
 #[cfg(all(feature = "io", feature = "pictures"))]
 pub mod manifest;
 #[cfg(feature = "io")]

@@ -55,6 +55,9 @@ fn smooth(s: &Surface, scene: &Scene) -> V8 {
     sum
 }
 
+/// The darkest tone's share of the brightest lamp.
+const LIFT: f32 = 0.25;
+
 /// The diffuse term in steps, and highlights with an edge (see [`crate::scene::Style::toon`]).
 #[inline(always)]
 fn toon(s: &Surface, scene: &Scene, steps: u32) -> V8 {
@@ -66,16 +69,19 @@ fn toon(s: &Surface, scene: &Scene, steps: u32) -> V8 {
             n_l = n_l * reach(s, scene, a.towards);
         }
         irradiance = irradiance + a.intensity * n_l;
+        if i > 0 {
+            continue;
+        }
         let n_h = s.normal.dot((s.view + a.towards).unit()).max(F8::ZERO).min(F8::ONE);
         let bright = simd::pow(n_h, s.shininess).gt(F8::splat(0.5)) & n_l.gt(F8::ZERO);
-        highlight = highlight + V8::select(bright, a.intensity * s.specular, V8::ZERO);
+        highlight = V8::select(bright, a.intensity * s.specular, V8::ZERO);
     }
     let key = brightest(&scene.lights);
     let scale = 1.0 / key.max_element().max(1e-30);
     let y = irradiance.x.max(irradiance.y).max(irradiance.z) * scale;
     let top = (steps.max(2) - 1) as f32;
     let step = (y.min(F8::ONE) * (top + 1.0)).floor().to_f32().min(F8::splat(top));
-    s.diffuse * V8::splat(key) * (step * (1.0 / top)) + highlight
+    s.diffuse * V8::splat(key) * (step * ((1.0 - LIFT) / top) + LIFT) + highlight
 }
 
 /// The colour of the lamp whose largest channel is largest; of several, the first.

@@ -3,9 +3,9 @@
 use super::{Camera, Light, LightKind};
 use glam::{Mat3, Vec3};
 
-/// What a lamp stands on.
+/// What a lamp's place and direction are told against.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Stand {
+pub enum LampFrame {
     /// The world: positions in metres, +y up.
     #[default]
     World,
@@ -14,13 +14,13 @@ pub enum Stand {
     Camera,
 }
 
-/// A lamp and what it stands on.
+/// A lamp and its frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lamp {
-    /// The lamp, in its stand's frame.
+    /// The lamp, in that frame.
     pub light: Light,
-    /// Its stand.
-    pub stand: Stand,
+    /// Which frame.
+    pub frame: LampFrame,
 }
 
 /// All light of a picture: `I_a(n) = ½(1+n_y)·above + ½(1−n_y)·below`, and lamps, the key light first.
@@ -36,9 +36,9 @@ pub struct Lighting {
 
 impl Lamp {
     /// A lamp infinitely far away in the direction `from`.
-    pub fn directional(from: Vec3, color: Vec3, stand: Stand) -> Self {
+    pub fn directional(from: Vec3, color: Vec3, frame: LampFrame) -> Self {
         let direction = -from.normalize_or(Vec3::Y);
-        Self { light: Light { kind: LightKind::Directional { direction }, color }, stand }
+        Self { light: Light { kind: LightKind::Directional { direction }, color }, frame }
     }
 }
 
@@ -47,7 +47,7 @@ impl Lighting {
     /// behind that draws the outline. They go round with the camera.
     pub fn studio() -> Self {
         let lamp = |from: [f32; 3], color: [f32; 3]| {
-            Lamp::directional(Vec3::from_array(from), Vec3::from_array(color), Stand::Camera)
+            Lamp::directional(Vec3::from_array(from), Vec3::from_array(color), LampFrame::Camera)
         };
         Self {
             above: Vec3::new(0.25, 0.26, 0.29),
@@ -55,15 +55,15 @@ impl Lighting {
             lamps: vec![
                 lamp([-0.65, 0.8, 0.6], [0.9, 0.86, 0.79]),
                 lamp([0.95, 0.2, 0.5], [0.13, 0.16, 0.21]),
-                lamp([0.55, 0.65, -0.85], [0.6, 0.63, 0.68]),
+                lamp([0.6, 0.55, -1.0], [0.95, 0.98, 1.05]),
             ],
         }
     }
 
-    /// One strong sun, fixed in the world on the right hand of a character that faces +z, under a blue sky and over warm ground.
+    /// One strong sun, fixed in the world, high before a character that faces +z, under a blue sky and over warm ground.
     pub fn sun() -> Self {
-        let sun = Lamp::directional(Vec3::new(-0.6, 0.85, 0.5), Vec3::new(1.0, 0.94, 0.83), Stand::World);
-        Self { above: Vec3::new(0.2, 0.26, 0.36), below: Vec3::new(0.15, 0.125, 0.1), lamps: vec![sun] }
+        let sun = Lamp::directional(Vec3::new(-0.2, 0.85, 0.6), Vec3::new(1.0, 0.93, 0.8), LampFrame::World);
+        Self { above: Vec3::new(0.22, 0.28, 0.38), below: Vec3::new(0.19, 0.16, 0.13), lamps: vec![sun] }
     }
 
     /// No lamps, and the same light from everywhere: surfaces are as bright as their texture.
@@ -77,18 +77,18 @@ impl Lighting {
     }
 }
 
-impl Stand {
+impl LampFrame {
     /// Its axes in the scene.
     pub fn axes(self, camera: &Camera) -> Mat3 {
         let axes = &camera.scene_from_view.matrix3;
         match self {
-            Stand::World => Mat3::IDENTITY,
-            Stand::Camera => trolley(axes.x_axis.into(), axes.z_axis.into()),
+            LampFrame::World => Mat3::IDENTITY,
+            LampFrame::Camera => trolley(axes.x_axis.into(), axes.z_axis.into()),
         }
     }
 }
 
-/// The axes of [`Stand::Camera`] for a camera whose right and backward directions are given: the vertical stays.
+/// The axes of [`LampFrame::Camera`] for a camera whose right and backward directions are given: the vertical stays.
 fn trolley(right: Vec3, back: Vec3) -> Mat3 {
     // Whoever looks along the vertical has a right hand, whoever lies on the side has a back.
     let level = |v: Vec3| v.with_y(0.0).try_normalize();

@@ -12,7 +12,7 @@ mod texture;
 
 pub use camera::{Camera, CameraError, Projection};
 pub use light::{Light, LightKind};
-pub use lighting::{Lamp, Lighting, Stand};
+pub use lighting::{Lamp, LampFrame, Lighting};
 pub use material::{AlphaMode, Material, TextureRef};
 pub use patch::MaterialPatch;
 pub use shadow::ShadowMap;

@@ -10,9 +10,9 @@ pub struct Style<'a> {
     pub below: Option<Vec3>,
     /// How many tones a surface has, from 2 on, if it is drawn like a cartoon.
     ///
-    /// With the lamps' light `E = Σ I max(0, n·l)` and the brightest lamp's colour `K`, the diffuse term is `k_d·K·q(Y)`, where
-    /// `Y` is `E`'s largest channel in terms of `K`'s and `q(Y) = min(⌊Y·n⌋, n−1)/(n−1)`. The highlight is `k_s·I` where
-    /// `(n·h)^p > ½`, and nothing elsewhere.
+    /// With the lamps' light `E = Σ I max(0, n·l)` and the brightest lamp's colour `K`, the diffuse term is `k_d·K·(¼ + ¾q(Y))`,
+    /// where `Y` is `E`'s largest channel in terms of `K`'s and `q(Y) = min(⌊Y·n⌋, n−1)/(n−1)`: the darkest tone stands for the
+    /// lamps that would fill it. The key light alone makes a highlight: `k_s·I` where `(n·h)^p > ½`, nothing elsewhere.
     pub toon: Option<u32>,
     /// What the key light, `Scene::lights[0]`, does not reach.
     pub shadow: Option<&'a ShadowMap>,

@@ -5,6 +5,7 @@
 mod farm;
 mod gltf_mutations;
 mod gltf_oracle;
+mod images;
 mod invalid;
 mod notes;
 #[path = "../../src/test_rng.rs"]
@@ -39,6 +40,11 @@ const TESTS: &[(&str, Test)] = &[
     ("notes::rest_is_the_identity", notes::rest_is_the_identity),
     ("notes::surfaces_are_counted", notes::surfaces_are_counted),
     ("notes::cut_rigs_are_refused", notes::cut_rigs_are_refused),
+    ("notes::pixels_move_as_in_the_notes", images::pixels_move_as_in_the_notes),
+    ("notes::grays_are_those_of_the_notes", images::grays_are_those_of_the_notes),
+    ("notes::the_mosaic_is_that_of_the_notes", images::the_mosaic_is_that_of_the_notes),
+    ("notes::hues_are_those_of_the_notes", images::hues_are_those_of_the_notes),
+    ("notes::layers_are_composited_as_in_the_notes", images::layers_are_composited_as_in_the_notes),
     ("changed_bytes_never_panic", gltf_mutations::run),
     ("broken_files_are_refused_politely", invalid::run),
     ("the_program_survives_broken_files", invalid::program),

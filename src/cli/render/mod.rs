@@ -129,7 +129,8 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         wrap: args.time.wrap(args.camera.turntable),
         view: args.sheet.view(args.camera.view(asset)?, args.camera.is_default()),
         framing: args.camera.framing(asset)?,
-        look: args.look.look(asset)?,
+        look: args.look.look(asset, |m| say.warn(m))?,
+        overlays: args.overlay.overlays(asset, args.time.fps)?,
         settings,
     };
     let background = if args.sheet.is_transparent() { [0.0; 4] } else { desc.look.background };
@@ -142,7 +143,7 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         shot: &shot,
         frames: moments.as_ref().unwrap_or(&plan.frames),
         rate: args.time.fps,
-        transparent: args.look.transparent() || args.sheet.is_transparent(),
+        transparent: look::transparent(&shot.desc().look) || args.sheet.is_transparent(),
         target: task.target,
         level: args.output.png,
         threads,

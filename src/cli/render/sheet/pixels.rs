@@ -1,7 +1,7 @@
 //! Options of pixel art.
 
 use super::super::film::Job;
-use super::super::look::parse_background;
+use super::super::look;
 use super::super::time::Frame;
 use super::draw;
 use crate::cli::{Failure, say::Say};
@@ -38,7 +38,7 @@ pub struct PixelArgs {
     palette_dither: Dither,
     /// A line of one pixel around the character, as #rrggbb; black unless a colour is given.
     #[arg(long, value_name = "COLOR", num_args = 0..=1, default_missing_value = "#000000", requires = "pixel_art", value_parser = parse_color)]
-    outline: Option<[u8; 3]>,
+    pixel_outline: Option<[u8; 3]>,
 }
 
 /// Paints frames on any thread; what a thread has looked up serves the next one.
@@ -112,7 +112,7 @@ impl PixelArgs {
         let desc = PixelArtDesc {
             colors: usize::from(self.colors),
             dither: self.palette_dither,
-            outline: self.outline,
+            outline: self.pixel_outline,
             background: (alpha == 255).then_some([r, g, b]),
             scale: self.scale(),
         };
@@ -148,6 +148,6 @@ fn parse_dither(text: &str) -> Result<Dither, String> {
 }
 
 fn parse_color(text: &str) -> Result<[u8; 3], String> {
-    let [r, g, b, alpha] = encode_srgb8(parse_background(text)?);
+    let [r, g, b, alpha] = encode_srgb8(look::parse_color(text).ok_or("expected #rrggbb")?);
     if alpha == 255 { Ok([r, g, b]) } else { Err("expected #rrggbb".into()) }
 }
