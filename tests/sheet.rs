@@ -311,7 +311,7 @@ fn threads_do_not_change_a_byte_of_a_sheet_or_of_what_lies_beside_it() {
     };
     for more in [
         &["--sheet", "trimmed", "--directions", "3", "--fps", "6", "--maps", "normal,depth,id"][..],
-        &["--sheet", "grid", "--pixel-art", "--outline", "--maps", "id,normal,depth", "--fps", "6"],
+        &["--sheet", "grid", "--pixel-art", "--pixel-outline", "--maps", "id,normal,depth", "--fps", "6"],
         &["--contact", "3x2", "--pixel-art", "--colors", "8"],
     ] {
         let one = files("1", more);
@@ -323,7 +323,7 @@ fn threads_do_not_change_a_byte_of_a_sheet_or_of_what_lies_beside_it() {
 fn maps_say_something_wherever_the_sheet_is_visible() {
     let dir = tempfile::tempdir().unwrap();
     let out = path(&dir, "m.png");
-    for more in [&[][..], &["--pixel-art", "--pixel-scale", "2", "--outline"]] {
+    for more in [&[][..], &["--pixel-art", "--pixel-scale", "2", "--pixel-outline"]] {
         let fixed = ["render", &rig_path("koi.json"), "-o", &out, "-f", "--sheet", "trimmed", "--fps", "4"];
         does(&[&fixed[..], &["--size", "64", "--maps", "normal,depth,id"], more].concat());
         let map = |name: &str| image::open(path(&dir, &format!("m.{name}.png"))).unwrap();
@@ -406,7 +406,7 @@ fn pixel_art_has_few_colors_no_partial_alpha_and_square_pixels() {
     };
     // A sequence: each file with the palette, transparent.
     let sequence = path(&dir, "p.##.png");
-    fixed(&sequence, &["--colors", "7", "--outline", "#102030", "--background", "transparent"]);
+    fixed(&sequence, &["--colors", "7", "--pixel-outline", "#102030", "--background", "transparent"]);
     let mut all = BTreeSet::new();
     for n in 1..=2 {
         let file = path(&dir, &format!("p.{n:02}.png"));
