@@ -3,6 +3,7 @@
 mod architecture;
 #[cfg(feature = "cli")]
 mod batch;
+mod channels;
 #[cfg(feature = "cli")]
 mod cli;
 #[cfg(feature = "cli")]
@@ -19,6 +20,8 @@ mod picture;
 mod raster;
 #[path = "../src/test_rng.rs"]
 mod rng;
+#[cfg(feature = "cli")]
+mod sheet;
 #[cfg(all(feature = "io", feature = "pictures"))]
 mod shots;
 #[cfg(all(feature = "io", feature = "pictures"))]

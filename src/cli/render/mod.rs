@@ -136,6 +136,7 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         settings,
     };
     let background = if args.sheet.is_transparent() { [0.0; 4] } else { desc.look.background };
+    let transparent = look::transparent(&desc.look) || args.sheet.is_transparent();
     let start = Instant::now();
     let desc = args.sheet.desc(desc, asset);
     let shot = Shot::new(asset, desc).map_err(|e| Failure::Usage(e.to_string()))?;
@@ -145,7 +146,7 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         shot: &shot,
         frames: moments.as_ref().unwrap_or(&plan.frames),
         rate: args.time.fps,
-        transparent: look::transparent(&shot.desc().look) || args.sheet.is_transparent(),
+        transparent,
         target: task.target,
         level: args.output.png,
         threads,
