@@ -2,7 +2,11 @@
 
 mod architecture;
 #[cfg(feature = "cli")]
+mod batch;
+#[cfg(feature = "cli")]
 mod cli;
+#[cfg(feature = "cli")]
+mod compare;
 #[cfg(all(feature = "io", feature = "pictures"))]
 mod corpus;
 mod deform;

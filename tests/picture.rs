@@ -459,7 +459,7 @@ fn half_written_files_never_appear() {
     let entries = || std::fs::read_dir(folder.path()).unwrap().count();
     let mut file = AtomicFile::create(&path, false, Folder::MustExist).unwrap();
     file.write_all(&[7; 100_000]).unwrap();
-    assert!(!path.exists() && entries() == 1);
+    assert!(!path.exists() && entries() <= 1);
     drop(file);
     assert_eq!(entries(), 0);
 

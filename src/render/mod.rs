@@ -1,8 +1,14 @@
 //! Scenes to pictures.
 
+pub mod backdrop;
+pub mod channel;
+pub mod footprint;
 mod material;
+pub mod outline;
 mod sample;
 mod shade;
+pub mod shadow;
+mod styled;
 
 // A loop that counts lanes is what becomes one vector instruction; iterators do not always.
 #[allow(clippy::needless_range_loop)]

@@ -21,14 +21,21 @@ mod exr;
 mod film;
 mod format;
 mod gif;
+mod gif_frames;
+mod indexed;
 mod judge;
 mod nearest;
 mod output;
 mod packet;
 mod palette;
+mod palette_file;
+mod pixel_art;
 mod png;
+mod read;
 mod rows;
 mod target;
+mod template;
+mod unnamed;
 mod webp;
 mod y4m;
 
@@ -37,12 +44,17 @@ pub use dither::{Dither, Indexed, Mapper};
 pub use exr::{ExrDepth, encode_exr};
 pub use film::{Film, FilmReport};
 pub use format::{Format, FormatError};
+pub use indexed::{Data, encode_data_png, encode_indexed_png};
 pub use judge::{DitherScore, choose_dither};
 pub use output::Output;
 pub use packet::{Coding, EncodedFrame, FilmWriter, FrameEncoder};
 pub use palette::Palette;
+pub use palette_file::PaletteError;
+pub use pixel_art::{PixelArt, PixelArtDesc};
 pub use png::{PngLevel, encode_png};
+pub use read::{Frame, Frames, Pixels, ReadError, frames_of};
 pub use target::{Pattern, Target, TargetError};
+pub use template::{Fields, Template, TemplateError};
 pub use webp::encode_webp;
 
 use crate::image::Rgba8;
@@ -178,6 +190,17 @@ impl Error {
 /// `640 × 480`.
 fn sides(s: &[usize; 2]) -> String {
     format!("{} × {}", s[0], s[1])
+}
+
+/// Refuse buffers that do not hold `each` bytes for every pixel of a PNG picture.
+fn check_sides([width, height]: [usize; 2], bytes: usize, each: usize) -> Result<(), Error> {
+    let limit = i32::MAX as usize;
+    let fits = |n: usize| (1..=limit).contains(&n);
+    let want = width.checked_mul(height).and_then(|n| n.checked_mul(each));
+    if fits(width) && fits(height) && want == Some(bytes) {
+        return Ok(());
+    }
+    Err(Error::Size { width, height, bytes, format: "PNG", limit })
 }
 
 /// Refuse pictures whose buffer does not match their sides, or whose sides the format cannot say.

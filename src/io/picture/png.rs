@@ -18,6 +18,17 @@ pub enum PngLevel {
     Best,
 }
 
+impl PngLevel {
+    /// The `png` crate's name for it.
+    pub(super) fn compression(self) -> ::png::Compression {
+        match self {
+            Self::Fast => ::png::Compression::Fast,
+            Self::Balanced => ::png::Compression::Balanced,
+            Self::Best => ::png::Compression::High,
+        }
+    }
+}
+
 /// Bytes of a PNG file: 8-bit sRGB, without an alpha channel where the picture is opaque.
 ///
 /// The same picture gives the same bytes. Pure: it may run on any thread.
@@ -90,11 +101,7 @@ fn compress(
     let mut encoder = ::png::Encoder::new(&mut file, width as u32, height as u32);
     encoder.set_color(color);
     encoder.set_depth(::png::BitDepth::Eight);
-    encoder.set_compression(if level == PngLevel::Best {
-        ::png::Compression::High
-    } else {
-        ::png::Compression::Balanced
-    });
+    encoder.set_compression(level.compression());
     let written = encoder.write_header().and_then(|mut w| {
         w.write_image_data(bytes)?;
         w.finish()
@@ -119,7 +126,7 @@ fn data_of(file: &[u8]) -> Vec<u8> {
 }
 
 /// The encoder's error as ours.
-fn failed(e: ::png::EncodingError) -> Error {
+pub(super) fn failed(e: ::png::EncodingError) -> Error {
     let source = match e {
         ::png::EncodingError::IoError(e) => e,
         other => std::io::Error::other(other.to_string()),

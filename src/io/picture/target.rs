@@ -193,6 +193,17 @@ impl Target {
         }
     }
 
+    /// The name, with `#` where the frame number goes; `-` for standard output.
+    pub fn name(&self) -> PathBuf {
+        match self {
+            Self::Still(path, _) | Self::Film(path, _) => path.clone(),
+            Self::Sequence(Pattern { folder, around: [before, after], width }, _) => {
+                folder.join(format!("{before}{}{after}", "#".repeat(*width)))
+            }
+            Self::Stdout(_) => "-".into(),
+        }
+    }
+
     /// The file that a frame goes into; none for standard output.
     pub fn path_of(&self, frame: i64) -> Option<PathBuf> {
         match self {

@@ -9,6 +9,7 @@
 //! threads, on the vector instructions that the machine has, or on the order in which tiles are drawn.
 
 mod blend;
+mod channels;
 mod clip;
 mod encode;
 mod fill;
@@ -20,6 +21,7 @@ mod tile;
 mod vertex;
 
 use super::Settings;
+use super::channel::{Channel, Channels};
 use crate::image::{Image, Rgba8};
 use crate::math::simd::{self, Isa};
 use crate::scene::Scene;
@@ -69,8 +71,8 @@ pub struct Stats {
     pub shaded: u64,
 }
 
-impl Stats {
-    fn add(&mut self, o: &Self) {
+impl std::ops::AddAssign for Stats {
+    fn add_assign(&mut self, o: Self) {
         self.triangles += o.triangles;
         self.vertices += o.vertices;
         self.skipped += o.skipped;
@@ -99,7 +101,7 @@ impl Stats {
 /// };
 /// let camera = Camera::look_at(Vec3::Z * 3.0, Vec3::ZERO, Vec3::Y, Projection::Orthographic { height: 1.0 });
 /// let scene = Scene {
-///     camera: camera.unwrap(), ambient: Vec3::ONE, lights: vec![], background: [0.0; 4],
+///     camera: camera.unwrap(), ambient: Vec3::ONE, lights: vec![], style: Default::default(), background: [0.0; 4],
 ///     objects: vec![object], materials: &[Material::default()], textures: &[],
 /// };
 /// let mut picture = Rgba8::default();
@@ -157,6 +159,22 @@ impl Rasterizer {
         self.paint(scene, &Settings { samples: 1, ..*settings }, encode::id_bands(out))
     }
 
+    /// Draw what the pixels show beside their colour: the channels that are asked for, and objects always; nothing that
+    /// blends is in them. `out` takes the size of `settings`.
+    ///
+    /// # Panics
+    /// If `settings` do not pass [`Settings::check`].
+    pub fn draw_channels(
+        &mut self,
+        scene: &Scene,
+        settings: &Settings,
+        wanted: &[Channel],
+        out: &mut Channels,
+    ) -> Stats {
+        out.reset(settings.width, settings.height, wanted);
+        self.paint(scene, settings, encode::channel_bands(out))
+    }
+
     /// All stages; `bands` are the rows of tiles of the output.
     fn paint(&mut self, scene: &Scene, settings: &Settings, bands: Vec<Target>) -> Stats {
         settings.check().expect("settings are checked by the caller");
@@ -187,8 +205,8 @@ impl Rasterizer {
                 simd::run(isa, tile::Row { frame: &frame, bins, row, scratch, target: &mut target });
             }
         });
-        bins.iter().for_each(|b| stats.add(&b.stats));
-        self.tiles[..threads].iter().for_each(|t| stats.add(&t.stats));
+        bins.iter().for_each(|b| stats += b.stats);
+        self.tiles[..threads].iter().for_each(|t| stats += t.stats);
         stats
     }
 }

@@ -324,7 +324,7 @@ fn shade(frame: &Frame, draw: &Draw, ids: &[u32; 8], px: F8, py: F8) -> [F8; 4] 
 }
 
 /// Mean position of the samples of a mask, pixels from the centre: it lies within the triangle that covers them.
-static CENTROIDS: [[f32; 2]; 16] = {
+pub(super) static CENTROIDS: [[f32; 2]; 16] = {
     let mut table = [[0.0; 2]; 16];
     let mut mask = 1;
     while mask < 16 {

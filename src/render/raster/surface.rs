@@ -277,6 +277,27 @@ impl<const ONE: bool> Kernel for Shade<'_, ONE> {
     }
 }
 
+/// Eight points whose normals are asked for.
+struct Normals<'a, const ONE: bool>(Shade<'a, ONE>);
+
+impl<const ONE: bool> Shade<'_, ONE> {
+    /// Unit shading normals, scene space.
+    pub fn normal(self) -> V8 {
+        simd::run(self.frame.isa, Normals(self))
+    }
+}
+
+impl<const ONE: bool> Kernel for Normals<'_, ONE> {
+    type Output = V8;
+
+    #[inline(always)]
+    fn run(self) -> V8 {
+        let Shade { frame, draw, ids, known, px, py } = self.0;
+        let seen = Seen::<ONE>::new(frame, draw, ids, known, px, py);
+        material::shading_normal(frame.isa, frame.scene, draw.material, &seen)
+    }
+}
+
 /// Eight points of one triangle to be held against the material's cut-off.
 pub(super) struct Present<'a> {
     pub frame: &'a Frame<'a>,

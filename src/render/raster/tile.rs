@@ -66,7 +66,7 @@ impl Row<'_, '_> {
                 put(&mut self.scratch.seen, f);
             }
         }
-        if self.target.write_ids(frame, x, w, &self.scratch.seen) {
+        if self.target.write_ids(frame, area, &self.scratch.seen) {
             return;
         }
 

@@ -1,0 +1,64 @@
+//! Bones by name, and what to say of names that are not there.
+
+use crate::cli::{Failure, say};
+use sinew::skeleton::{BoneId, Skeleton};
+
+/// Names that are shown where none fits.
+const SHOWN: usize = 8;
+
+/// The bone that an option names: as written, else whatever the case of its letters, else by index.
+pub fn find_bone(skeleton: &Skeleton, option: &str, name: &str) -> Result<BoneId, Failure> {
+    let lower = name.to_lowercase();
+    let index = name.parse::<u32>().ok().filter(|&i| (i as usize) < skeleton.len()).map(BoneId);
+    let loose = || skeleton.ids().find(|&b| skeleton.name(b).to_lowercase() == lower);
+    skeleton.find(name).or_else(loose).or(index).ok_or_else(|| {
+        let near: Vec<String> = near(skeleton, &lower).into_iter().map(say::name).collect();
+        let count = skeleton.len();
+        let rest =
+            if count > near.len() { format!(" (of {count}; `sinew info` lists all)") } else { String::new() };
+        let has = if near.is_empty() { "there are none".into() } else { near.join(", ") };
+        Failure::Usage(format!("{option} {name}: there is no such bone; near names: {has}{rest}"))
+    })
+}
+
+/// The names most like `lower`, best first: those that contain it, then by edits.
+fn near<'s>(skeleton: &'s Skeleton, lower: &str) -> Vec<&'s str> {
+    let mut all: Vec<(usize, &str)> = skeleton
+        .ids()
+        .map(|b| {
+            let other = skeleton.name(b).to_lowercase();
+            let part = !other.is_empty() && (other.contains(lower) || lower.contains(&other));
+            (if part { 0 } else { 1 + edits(lower, &other) }, skeleton.name(b))
+        })
+        .collect();
+    all.sort_by_key(|(d, _)| *d);
+    all.into_iter().map(|(_, name)| name).take(SHOWN).collect()
+}
+
+/// Letters to be put in, taken out or replaced to make one word the other; words are cut at 64 letters.
+fn edits(a: &str, b: &str) -> usize {
+    let (a, b): (Vec<char>, Vec<char>) = (a.chars().take(64).collect(), b.chars().take(64).collect());
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.iter().enumerate() {
+        let mut corner = i;
+        row[0] = i + 1;
+        for (j, y) in b.iter().enumerate() {
+            let replaced = corner + usize::from(x != y);
+            corner = row[j + 1];
+            row[j + 1] = replaced.min(row[j] + 1).min(corner + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn edits_are_counted() {
+        for (a, b, n) in [("", "abc", 3), ("tail", "tale", 2), ("hand", "hand", 0), ("head", "heads", 1)] {
+            assert_eq!((edits(a, b), edits(b, a)), (n, n), "{a} {b}");
+        }
+    }
+}
