@@ -10,6 +10,7 @@ mod onion;
 mod ordered;
 mod overlay;
 mod path;
+mod pivot;
 mod stand;
 mod stroke;
 mod view;
@@ -19,6 +20,7 @@ pub use framing::{Framing, Turns};
 pub use look::{GroundLook, Look, Shading, Shadows};
 pub use ordered::{Stop, in_order, in_order_pairs};
 pub use overlay::{BonesDesc, Onion, Overlays, PathDesc};
+pub use pivot::ground_point;
 pub use view::{FramingDesc, Pivot, View, ViewError};
 pub use worker::Worker;
 
@@ -173,6 +175,22 @@ impl<'a> Shot<'a> {
     /// What was asked for.
     pub fn desc(&self) -> &ShotDesc {
         &self.desc
+    }
+
+    /// Seconds of the clip.
+    pub fn range(&self) -> Range {
+        self.range
+    }
+
+    /// Where the character stands in the world over the shot's clip: [`ground_point`].
+    pub fn ground_point(&self) -> DVec3 {
+        ground_point(self.asset, self.desc.clip)
+    }
+
+    /// Names of the objects that pixels may show, in order: those of the meshes that the character's instances wear.
+    pub fn object_names(&self) -> Vec<String> {
+        let character = &self.asset.character;
+        character.instances().iter().map(|i| character.mesh(i).name.clone()).collect()
     }
 
     /// Pixels a row, and rows, of its pictures.

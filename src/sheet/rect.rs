@@ -1,7 +1,5 @@
 //! Rectangles of pixels.
 
-use crate::image::Rgba8;
-
 /// A part of a picture, in pixels from the top left.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Hash)]
 pub struct Rect {
@@ -42,20 +40,18 @@ impl Rect {
     }
 }
 
-/// The smallest rectangle that holds every pixel whose alpha is not 0; the first pixel alone where there is none.
+/// The smallest rectangle that holds every pixel that is `seen`; the first pixel alone where there is none.
 ///
 /// ```
-/// use sinew::{image::Rgba8, sheet::{Rect, visible}};
-/// let mut picture = Rgba8 { width: 4, height: 3, data: vec![0; 48] };
-/// (picture.data[4 * 5 + 3], picture.data[4 * 10 + 3]) = (255, 1);
-/// assert_eq!(visible(&picture), Rect { x: 1, y: 1, w: 2, h: 2 });
+/// use sinew::sheet::{Rect, visible};
+/// let alpha = [0, 0, 0, 0, 0, 9, 0, 0, 0, 0, 1, 0];
+/// assert_eq!(visible(&alpha, 4, |&a| a > 0), Rect { x: 1, y: 1, w: 2, h: 2 });
 /// ```
-pub fn visible(picture: &Rgba8) -> Rect {
-    let w = picture.width.max(1);
+pub fn visible<P>(pixels: &[P], width: usize, seen: impl Fn(&P) -> bool) -> Rect {
     let (mut left, mut right, mut top, mut bottom) = (usize::MAX, 0, usize::MAX, 0);
-    for (y, row) in picture.data.as_chunks::<4>().0.chunks(w).enumerate() {
-        let Some(first) = row.iter().position(|p| p[3] > 0) else { continue };
-        let last = row.iter().rposition(|p| p[3] > 0).unwrap_or(first);
+    for (y, row) in pixels.chunks(width.max(1)).enumerate() {
+        let Some(first) = row.iter().position(&seen) else { continue };
+        let last = row.iter().rposition(&seen).unwrap_or(first);
         (left, right) = (left.min(first), right.max(last));
         (top, bottom) = (top.min(y), y);
     }

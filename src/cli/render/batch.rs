@@ -70,7 +70,7 @@ impl<'a> Batch<'a> {
         let usage = |e: &dyn std::fmt::Display| Failure::Usage(e.to_string());
         let template = Template::parse(args.output.name()).map_err(|e| usage(&e))?;
         args.output.target(&template.fill(&Fields { name: "name", folder: "folder", clip: "clip" }))?;
-        args.output.settings()?;
+        args.sheet.settings(args.output.settings()?)?;
         if args.inputs.len() > 1 && !template.tells_inputs() {
             let message = "-o: several inputs need {name} (or {folder}) in the output's name";
             return Err(Failure::Usage(message.into()));
@@ -187,6 +187,7 @@ impl<'a> Batch<'a> {
         let target = self.target(input, clip_name.as_deref().unwrap_or("rest"))?;
         self.claim(input, &clip_name, &target)?;
         target.path_of(1).map_or(Ok(()), |path| keep_inputs(self.args, &path))?;
+        self.args.sheet.companions(&target).iter().try_for_each(|p| keep_inputs(self.args, p))?;
         let task = Task { input, import, clip, target: &target };
         let mut plan = plan(self.args, &task)?;
         self.take_share(&target, &mut plan.frames);

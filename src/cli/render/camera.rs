@@ -118,7 +118,8 @@ impl CameraArgs {
         }
     }
 
-    fn is_default(&self) -> bool {
+    /// Whether nobody said where the camera stands.
+    pub fn is_default(&self) -> bool {
         self.camera == "yaw=30,pitch=12,fov=30"
     }
 

@@ -1,13 +1,14 @@
 //! Frames into files: drawn and encoded by workers, written in order.
 
+use super::sheet::Painter;
 use super::time::Frame;
 use crate::cli::{Failure, say::Say};
 use sinew::frames::{FrameStats, Moment, Shot, Stop, Worker, in_order_pairs};
 use sinew::image::{Image, Rgba8};
 use sinew::io::manifest::sha256;
 use sinew::io::picture::{
-    self, AtomicFile, Coding, ExrDepth, Film, FilmWriter, Folder, Format, FrameEncoder, Output, Palette,
-    PngLevel, Target, choose_dither, encode_exr, encode_png, encode_webp,
+    self, AtomicFile, Coding, Dither, ExrDepth, Film, FilmWriter, Folder, Format, FrameEncoder, Output,
+    Palette, PngLevel, Target, choose_dither, encode_exr, encode_png, encode_webp,
 };
 use sinew::time::Rate;
 use std::io::Write;
@@ -28,6 +29,17 @@ pub struct Job<'a> {
     pub force: bool,
     /// Compute hashes.
     pub hash: bool,
+    /// Frames become pixel art; they are drawn before nothing then.
+    pub art: Option<Painter>,
+    /// Pixels of a finished frame for each one that is drawn, across and down.
+    pub scale: usize,
+}
+
+impl Job<'_> {
+    /// Pixels of a finished frame.
+    pub fn size(&self) -> [usize; 2] {
+        self.shot.size().map(|side| side * self.scale)
+    }
 }
 
 /// What was written, and what it cost.
@@ -50,9 +62,16 @@ pub fn write(job: &Job, say: &Say) -> Result<Written, Failure> {
     let film = job.target.is_film(job.frames.len());
     let drawn = match job.target.format() {
         _ if film => write_film(job, say),
+        Format::Exr if job.art.is_some() => {
+            let message = "--pixel-art: OpenEXR has no palette; expected a name that ends in .png, .webp, .gif or .apng";
+            return Err(Failure::Usage(message.into()));
+        }
         Format::Exr => stills(job, say, shoot_linear, |p| encode_exr(p, ExrDepth::Float)),
         Format::Webp => stills(job, say, shoot, encode_webp),
-        _ => stills(job, say, shoot, |p| encode_png(p, job.level)),
+        _ => match &job.art {
+            Some(art) => stills(job, say, shoot, |p| art.encode_png(p, job.level)),
+            None => stills(job, say, shoot, |p| encode_png(p, job.level)),
+        },
     };
     let written = match drawn {
         // A reader that has seen enough (`| head`) is no failure.
@@ -100,17 +119,21 @@ fn refuse_existing(job: &Job) -> Result<(), Failure> {
 }
 
 /// Draws one moment.
-type Shoot<P> = fn(&Shot, Moment, &mut Worker) -> (P, FrameStats);
+type Shoot<P> = fn(&Job, Moment, &mut Worker) -> (P, FrameStats);
 
-fn shoot(shot: &Shot, moment: Moment, worker: &mut Worker) -> (Rgba8, FrameStats) {
+/// As it is shown: painted, where there is pixel art.
+fn shoot(job: &Job, moment: Moment, worker: &mut Worker) -> (Rgba8, FrameStats) {
     let mut out = Rgba8::default();
-    let stats = shot.draw(moment, worker, &mut out);
-    (out, stats)
+    let stats = job.shot.draw(moment, worker, &mut out);
+    match &job.art {
+        Some(art) => (art.paint(&out), stats),
+        None => (out, stats),
+    }
 }
 
-fn shoot_linear(shot: &Shot, moment: Moment, worker: &mut Worker) -> (Image, FrameStats) {
+fn shoot_linear(job: &Job, moment: Moment, worker: &mut Worker) -> (Image, FrameStats) {
     let mut out = Image::default();
-    let stats = shot.draw_linear(moment, worker, &mut out);
+    let stats = job.shot.draw_linear(moment, worker, &mut out);
     (out, stats)
 }
 
@@ -126,7 +149,7 @@ fn draw<P: Send + Sync, S, T: Send>(
     let mut fault = None;
     let mut written = Written::default();
     let start = || (Worker::default(), state());
-    let first = |(worker, _): &mut (Worker, S), i: usize| shoot(job.shot, frames[i].moment, worker);
+    let first = |(worker, _): &mut (Worker, S), i: usize| shoot(job, frames[i].moment, worker);
     let second = |(_, s): &mut (Worker, S), before: Option<&(P, FrameStats)>, now: &(P, FrameStats)| {
         let start = Instant::now();
         let encoded = encode(s, before.map(|b| &b.0), &now.0);
@@ -191,8 +214,8 @@ fn stills<P: Send + Sync>(
 
 /// All frames into one file.
 fn write_film(job: &Job, say: &Say) -> Result<Written, Fault> {
-    let size = job.shot.size();
-    let film = Film { transparent: job.transparent, ..Film::new(size, job.frames.len() as u32, job.rate) };
+    let film =
+        Film { transparent: job.transparent, ..Film::new(job.size(), job.frames.len() as u32, job.rate) };
     let format = job.target.format();
     // WebP goes back to its head, which a pipe cannot.
     let mut out = match job.target.path_of(0) {
@@ -200,7 +223,10 @@ fn write_film(job: &Job, say: &Say) -> Result<Written, Fault> {
         None => Output::stdout(format == Format::Webp),
     };
     let coding = match format {
-        Format::Gif => gif_coding(job, &film, say)?,
+        Format::Gif => match &job.art {
+            Some(art) => Coding::Gif(art.palette().clone(), Dither::None),
+            None => gif_coding(job, &film, say)?,
+        },
         Format::Webp => Coding::Webp,
         Format::Y4m => Coding::Y4m,
         _ => Coding::Apng(job.level),

@@ -26,7 +26,7 @@ pub struct LookArgs {
     /// key and a fill light if there are none.
     #[arg(long, value_name = "studio|sun|flat|asset|FILE")]
     light: Option<String>,
-    /// Lamps, background and changes of materials from a look file, which poses/README.md describes; other options go before it.
+    /// Lamps, background and changes of materials from a look file, which rigs/looks/README.md describes; other options go before it.
     #[arg(long, value_name = "FILE.json")]
     look: Option<PathBuf>,
     /// smooth, flat (facets), or toon[=STEPS]: so many tones, 2 to 16.
@@ -153,7 +153,7 @@ fn opaque(code: u32) -> [f32; 4] {
 }
 
 /// `#rrggbb` as linear RGBA.
-fn parse_color(text: &str) -> Option<[f32; 4]> {
+pub fn parse_color(text: &str) -> Option<[f32; 4]> {
     let hex =
         text.trim().strip_prefix('#').filter(|h| h.len() == 6 && h.bytes().all(|b| b.is_ascii_hexdigit()));
     hex.and_then(|h| u32::from_str_radix(h, 16).ok()).map(opaque)

@@ -31,6 +31,10 @@ Examples:
   sinew render fox.glb -o run.####.png --clip Run --fps 30 --background transparent
   sinew render fox.glb -o part.%04d.png --frames 1-48x2,60
   sinew render fox.glb -o side.apng --camera yaw=90,pitch=5,fov=20
+  sinew render rigs/pip.json -o pip-sheet.png --sheet trimmed --directions 8 --camera pitch=30,yaw=0,ortho --size 128 --fps 12
+  sinew render fox.glb -o fox-sheet.png --sheet grid --maps normal,depth,id --sheet-json aseprite --size 128
+  sinew render fox.glb -o fox.gif --pixel-art --pixel-scale 4 --size 256 --colors 16 --outline
+  sinew render fox.glb -o fox-contact.png --contact 6x4 --size 160
   sinew render fox.glb -o icon.png --camera isometric --background transparent
   sinew render rigs/fox.json -o round.gif --turntable
   sinew render *.glb --all-clips -o thumbs/{name}-{clip}.gif
@@ -91,9 +95,12 @@ struct Plan {
 fn plan(args: &Args, task: &Task) -> Result<Plan, Failure> {
     let clips = task.import.asset.character.clips();
     let range = task.clip.map_or(Range::default(), |c| clips[c].playback());
-    let alone = !task.target.takes_a_clip();
+    let one_picture = args.sheet.is_one_picture();
+    let alone = !task.target.takes_a_clip() && !one_picture;
     let frames = args.time.frames(task.input, range, alone, args.camera.turntable)?;
-    task.target.check_frames(frames.len()).map_err(|e| Failure::Usage(e.to_string()))?;
+    if !one_picture {
+        task.target.check_frames(frames.len()).map_err(|e| Failure::Usage(e.to_string()))?;
+    }
     let settings = args.output.settings()?;
     let whole = [settings.width, settings.height];
     Ok(Plan { frames, size: args.camera.crop(whole)?.map_or(whole, |c| [c.width, c.height]) })
@@ -114,34 +121,49 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
 
     // One picture is drawn by all threads, many by one thread each.
     let threads = args.output.threads();
-    let alone = plan.frames.len() == 1;
-    let settings = Settings { threads: if alone { threads } else { 1 }, ..args.output.settings()? };
+    let one_picture = args.sheet.is_one_picture();
+    let alone = plan.frames.len() == 1 && !one_picture;
+    let settings = args.sheet.settings(args.output.settings()?)?;
+    let settings = Settings { threads: if alone { threads } else { 1 }, ..settings };
     let desc = ShotDesc {
         clip: task.clip,
         wrap: args.time.wrap(args.camera.turntable),
-        view: args.camera.view(asset)?,
+        view: args.sheet.view(args.camera.view(asset)?, args.camera.is_default()),
         framing: args.camera.framing(asset)?,
         look: args.look.look(asset, |m| say.warn(m))?,
         overlays: args.overlay.overlays(asset, args.time.fps)?,
         crop: args.camera.crop([settings.width, settings.height])?,
         settings,
     };
+    let background = if args.sheet.is_transparent() { [0.0; 4] } else { desc.look.background };
+    let transparent = look::transparent(&desc.look) || args.sheet.is_transparent();
     let start = Instant::now();
+    let desc = args.sheet.desc(desc, asset);
     let shot = Shot::new(asset, desc).map_err(|e| Failure::Usage(e.to_string()))?;
     totals.framing += start.elapsed();
-    let job = Job {
+    let moments = args.sheet.contact_frames(&shot);
+    let mut job = Job {
         shot: &shot,
-        frames: &plan.frames,
+        frames: moments.as_ref().unwrap_or(&plan.frames),
         rate: args.time.fps,
-        transparent: look::transparent(&shot.desc().look),
+        transparent,
         target: task.target,
         level: args.output.png,
         threads,
         force: args.output.force,
         hash: args.batch.manifest.is_some(),
+        art: None,
+        scale: args.sheet.pixels.scale(),
     };
-    let written = film::write(&job, say)?;
-    totals.add(&written, plan.frames.len());
+    job.art = args.sheet.pixels.art(&job, background, say)?;
+    let written = if one_picture {
+        let name = task.clip.map_or("rest", |c| character.clips()[c].name.as_str());
+        args.sheet.write(&job, name, say)?;
+        Written::default()
+    } else {
+        film::write(&job, say)?
+    };
+    totals.add(&written, job.frames.len());
     Ok(written)
 }
 

@@ -33,6 +33,18 @@ impl Indexed {
         Self { size: [w * k, h * k], indices }
     }
 
+    /// The indices of a picture whose colours are all in the palette: what undoes [`to_rgba8`](Self::to_rgba8). Pixels that are not opaque
+    /// are transparent, and so are colours that the palette does not have.
+    pub fn of_rgba8(picture: &Rgba8, palette: &Palette) -> Self {
+        let mut places: Vec<([u8; 3], u8)> = palette.colors().iter().copied().zip(0..).collect();
+        places.sort();
+        let find = |color: [u8; 3]| places.binary_search_by_key(&color, |p| p.0).map(|i| places[i].1).ok();
+        let index = |&[r, g, b, a]: &[u8; 4]| Some([r, g, b]).filter(|_| a == 255).and_then(find);
+        let pixels = picture.data.as_chunks::<4>().0.iter();
+        let indices = pixels.map(|p| index(p).unwrap_or(palette.transparent())).collect();
+        Self { size: [picture.width, picture.height], indices }
+    }
+
     /// The colours that the indices stand for; the index after the last colour is transparent.
     pub fn to_rgba8(&self, palette: &Palette) -> Rgba8 {
         let color = |&i: &u8| match palette.colors().get(usize::from(i)) {
