@@ -111,8 +111,9 @@ impl Trail {
                 stroke::dot(&mut Pad { image: out, corner }, at, radius * width, ink);
             }
         };
+        let small = self.dot(&lens);
         for (t, p) in self.places.iter().step_by(BETWEEN) {
-            dot(out, *p, DOT, ink(*t));
+            dot(out, *p, small, ink(*t));
         }
         for (t, p) in &self.keys {
             dot(out, *p, KEY, ink(*t));
@@ -120,6 +121,16 @@ impl Trail {
         let skeleton = shot.asset.character.skeleton();
         let here = end(skeleton, &self.desc, posed, shot.center);
         dot(out, here, NOW, Ink { color: [1.0; 3], alpha: 1.0 });
+    }
+}
+
+impl Trail {
+    /// Radius of a frame's dot in widths: smaller where dots lie so close that they would hide the line.
+    fn dot(&self, lens: &Lens) -> f64 {
+        let ends = self.places.windows(2).filter_map(|two| lens.line(two[0].1, two[1].1));
+        let length: f64 = ends.map(|[a, b]| a.distance(b)).sum();
+        let apart = length * BETWEEN as f64 / (self.places.len().max(2) - 1) as f64;
+        (0.35 * apart / f64::from(self.desc.width_px)).clamp(0.5, DOT)
     }
 }
 
@@ -138,7 +149,7 @@ fn keys(clip: &Clip, skeleton: &Skeleton, bone: BoneId) -> Vec<f64> {
     let mut at = Some(bone);
     while let Some(b) = at {
         let tracks = clip.tracks.iter().filter(|t| moves(b, &t.target));
-        let mut times: Vec<f64> = tracks.flat_map(|t| t.curve.times().iter().map(|&t| t.into())).collect();
+        let mut times: Vec<f64> = tracks.flat_map(|t| t.curve.times().iter().copied()).collect();
         if !times.is_empty() {
             times.sort_by(f64::total_cmp);
             times.dedup();
