@@ -1,7 +1,9 @@
 //! `sinew compare` as its users meet it: verdicts, exit codes, reports, panels.
 
 use sinew::image::Rgba8;
-use sinew::io::picture::{ApngWriter, Film, PngLevel, encode_png, frames_of};
+use sinew::io::picture::{
+    Coding, Dither, Film, FilmWriter, FrameEncoder, Mapper, Palette, PngLevel, encode_png, frames_of,
+};
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -51,20 +53,24 @@ impl Bench {
     }
 
     fn film(&self, name: &str, frames: &[Rgba8], fps: &str) -> String {
-        let film = Film {
-            size: [frames[0].width, frames[0].height],
-            frames: frames.len() as u32,
-            rate: fps.parse().expect("a rate"),
-            plays: 0,
-            transparent: false,
-            matte: [0; 3],
-        };
-        let mut bytes = Vec::new();
-        let mut writer = ApngWriter::new(&mut bytes, film, PngLevel::Fast).expect("begun");
-        frames.iter().for_each(|f| writer.write(f).expect("a frame"));
-        writer.finish().expect("finished");
-        self.put(name, &bytes)
+        self.put(name, &film(frames, fps, &Coding::Apng(PngLevel::Fast)))
     }
+}
+
+fn head(frames: &[Rgba8], fps: &str) -> Film {
+    Film::new([frames[0].width, frames[0].height], frames.len() as u32, fps.parse().expect("a rate"))
+}
+
+fn film(frames: &[Rgba8], fps: &str, coding: &Coding) -> Vec<u8> {
+    let (film, mut file) = (head(frames, fps), std::io::Cursor::new(Vec::new()));
+    let mut writer = FilmWriter::new(&mut file, film, coding).expect("begun");
+    let mut encoder = FrameEncoder::new(film, coding);
+    for (k, frame) in frames.iter().enumerate() {
+        let before = k.checked_sub(1).map(|b| &frames[b]);
+        writer.write(encoder.encode(before, frame).expect("encoded")).expect("written");
+    }
+    writer.finish().expect("finished");
+    file.into_inner()
 }
 
 fn json(out: &Output) -> serde_json::Value {
@@ -261,39 +267,58 @@ fn the_panels_show_expected_difference_and_actual() {
 }
 
 #[test]
-fn gifs_of_the_program_are_read_as_they_were_meant() {
-    // Films of our own writer hold rectangles and keep what is below.
-    let b = Bench::new();
+fn films_of_the_program_are_read_as_they_were_meant() {
+    // Our writers store rectangles and keep what is below.
     let frames: Vec<Rgba8> = [0, 100, 200, 0].map(|m| picture(40, m)).into();
-    let film = Film {
-        size: [40, 24],
-        frames: 4,
-        rate: "10".parse().unwrap(),
-        plays: 0,
-        transparent: false,
-        matte: [0; 3],
+    let head = head(&frames, "10");
+    let palette = Palette::from_frames(&frames[..], 256, &head);
+    let mut mapper = Mapper::new(&palette, &head);
+    let of_palette = |indices: Vec<u8>| -> Vec<u8> {
+        let color = |&i: &u8| palette.colors()[usize::from(i)];
+        indices.iter().map(color).flat_map(|[r, g, b]| [r, g, b, 255]).collect()
     };
-    let palette = sinew::io::picture::Palette::from_frames(&frames[..], 256, &film);
-    let mut mapper = sinew::io::picture::Mapper::new(&palette, &film);
-    let mut bytes = Vec::new();
-    let none = sinew::io::picture::Dither::None;
-    let mut writer = sinew::io::picture::GifWriter::new(&mut bytes, film, &palette, none).expect("begun");
-    let mapped: Vec<_> = frames.iter().map(|f| mapper.map(f, none)).collect();
-    frames.iter().for_each(|f| writer.write(f).expect("a frame"));
-    writer.finish().expect("finished");
-    let read: Vec<_> = frames_of(&bytes).unwrap().map(|f| f.unwrap()).collect();
-    assert_eq!(read.len(), 4);
-    for (frame, indexed) in read.iter().zip(&mapped) {
-        let colors = indexed.indices.iter().flat_map(|&i| {
-            let [r, g, b] = palette.colors()[usize::from(i)];
-            [r, g, b, 255]
-        });
-        assert!(frame.pixels.clone().into_codes().data.into_iter().eq(colors));
-        assert_eq!(frame.delay_ms, (100, 1));
+    let mapped = frames.iter().map(|f| of_palette(mapper.map(f, Dither::None).indices)).collect();
+    let exact: Vec<Vec<u8>> = frames.iter().map(|f| f.data.clone()).collect();
+    let b = Bench::new();
+    for (coding, want) in [
+        (Coding::Gif(palette.clone(), Dither::None), &mapped),
+        (Coding::Apng(PngLevel::Fast), &exact),
+        (Coding::Webp, &exact),
+    ] {
+        let bytes = film(&frames, "10", &coding);
+        let read: Vec<_> = frames_of(&bytes).unwrap().map(|f| f.unwrap()).collect();
+        assert!(read.iter().all(|f| f.delay_ms.0 == 100 * f.delay_ms.1), "{coding:?}");
+        let read: Vec<Vec<u8>> = read.into_iter().map(|f| f.pixels.into_codes().data).collect();
+        assert!(read == *want, "{coding:?}");
+
+        let (whole, cut) = (b.put("whole", &bytes), b.put("cut", &bytes[..bytes.len() / 2]));
+        assert_eq!(code(&compare(&[&whole, &whole])), 0, "{coding:?}");
+        assert_eq!(code(&compare(&[&whole, &cut])), 3, "{coding:?}");
     }
-    let (gif, cut) = (b.put("a.gif", &bytes), b.put("cut.gif", &bytes[..bytes.len() / 2]));
-    assert_eq!(code(&compare(&[&gif, &gif])), 0);
-    assert_eq!(code(&compare(&[&gif, &cut])), 3);
+}
+
+#[test]
+fn light_is_compared_as_it_is() {
+    use sinew::image::Image;
+    use sinew::io::picture::{ExrDepth, encode_exr};
+    let b = Bench::new();
+    let light = |l: f32| Image::filled(20, 20, [l, 4.0, 0.25, 1.0]);
+    let put = |name: &str, l: f32| b.put(name, &encode_exr(&light(l), ExrDepth::Float).unwrap());
+    let (a, same, near, far) =
+        (put("a.exr", 0.5), put("same.exr", 0.5), put("near.exr", 0.500001), put("far.exr", 0.6));
+    assert_eq!(code(&compare(&[&a, &same])), 0);
+    // No code differs, the light does.
+    assert_eq!(code(&compare(&[&a, &near])), 4);
+    assert_eq!(code(&compare(&[&a, &near, "--max-diff", "0"])), 0);
+    let v = json(&compare(&[&a, &far, "--json"]));
+    // A tenth in one of three channels: 10 log₁₀(3 / 0.01).
+    assert!((v["pairs"][0]["psnr_linear_db"].as_f64().unwrap() - 24.771).abs() < 0.001, "{v}");
+    assert_eq!(v["pairs"][0]["worst"]["channel"], "red");
+    // A picture of 8 bits may stand against light.
+    let png = b.png("a.png", &light(0.5).to_rgba8());
+    assert_eq!(code(&compare(&[&a, &png])), 0);
+    let cut = b.put("cut.exr", &std::fs::read(&a).unwrap()[..400]);
+    assert_eq!(code(&compare(&[&a, &cut])), 3);
 }
 
 #[test]

@@ -13,6 +13,10 @@ mod corpus;
 mod deform;
 #[cfg(feature = "io")]
 mod gltf;
+#[cfg(feature = "cli")]
+mod golden;
+#[cfg(feature = "io")]
+mod looks;
 #[cfg(feature = "pictures")]
 mod picture;
 mod raster;
@@ -22,3 +26,5 @@ mod rng;
 mod sheet;
 #[cfg(all(feature = "io", feature = "pictures"))]
 mod shots;
+#[cfg(all(feature = "io", feature = "pictures"))]
+mod views;

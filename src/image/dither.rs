@@ -77,7 +77,13 @@ const BAYER: [[u8; 8]; 8] = {
 fn noise(x: usize, y: usize) -> f32 {
     // In f64, so that wide pictures keep their fractions; a period of 2¹⁶ is more than any picture has.
     let fine = 0.06711056 * (x & 0xffff) as f64 + 0.00583715 * (y & 0xffff) as f64;
-    (52.9829189 * fine.fract()).fract() as f32
+    fraction(52.9829189 * fraction(fine)) as f32
+}
+
+/// `x − ⌊x⌋` of what is neither negative nor large: as an integer it is one instruction everywhere.
+#[inline]
+fn fraction(x: f64) -> f64 {
+    x - f64::from(x as i32)
 }
 
 /// Steps of √light in the table of first guesses.
@@ -101,8 +107,10 @@ pub struct Levels {
     lights: Vec<f32>,
     /// The light from which on the next level is nearer, as signals.
     borders: Vec<f32>,
-    /// The level below and the nearest one at the start of each step.
-    guess: Vec<[u8; 2]>,
+    /// The light from which on the next level is nearer, as light.
+    middles: Vec<f32>,
+    /// The level below, the one nearest as a signal and the one nearest as light at the start of each step.
+    guess: Vec<[u8; 3]>,
 }
 
 impl Levels {
@@ -114,13 +122,15 @@ impl Levels {
         let lights: Vec<f32> = codes.iter().map(|&c| transfer.light(signal(c) / 255.0)).collect();
         let borders: Vec<f32> =
             codes.windows(2).map(|c| transfer.light((signal(c[0]) + signal(c[1])) * 0.5 / 255.0)).collect();
+        let middles: Vec<f32> = lights.windows(2).map(|l| (l[0] + l[1]) * 0.5).collect();
         let start = |i: usize| {
             let light = (i as f32 / STEPS as f32).powi(2);
-            let below = lights.partition_point(|&l| l <= light).saturating_sub(1);
-            [below.min(n - 2) as u8, borders.partition_point(|&l| l <= light) as u8]
+            let above = |lights: &[f32]| lights.partition_point(|&l| l <= light);
+            let below = above(&lights).saturating_sub(1).min(n - 2);
+            [below, above(&borders), above(&middles)].map(|k| k as u8)
         };
         let guess = (0..=STEPS).map(start).collect();
-        Self { codes, lights, borders, guess }
+        Self { codes, lights, borders, middles, guess }
     }
 
     /// The 8-bit code of each level.
@@ -134,7 +144,7 @@ impl Levels {
     }
 
     #[inline]
-    fn guess(&self, light: f32) -> [usize; 2] {
+    fn guess(&self, light: f32) -> [usize; 3] {
         self.guess[(light.sqrt() * STEPS as f32) as usize].map(usize::from)
     }
 
@@ -147,6 +157,16 @@ impl Levels {
             k += 1;
         }
         self.codes[k]
+    }
+
+    /// The level whose *light* is nearest, of light within 0…1.
+    #[inline]
+    fn settle(&self, light: f32) -> usize {
+        let mut k = self.guess(light)[2];
+        while k < self.middles.len() && self.middles[k] <= light {
+            k += 1;
+        }
+        k
     }
 
     /// The lower of the two levels around some light, and the share of the upper one in the mixture that has this light.
@@ -275,41 +295,70 @@ fn diffuse<'a>(
     levels: &Levels,
     color: &impl Fn([f32; 4]) -> [f32; 3],
 ) {
-    // A pixel of margin on both sides takes what falls off.
-    let (mut now, mut next) = (vec![[0.0; 3]; width + 2], vec![[0.0; 3]; width + 2]);
+    // Errors that this row and the next receive from above.
+    let (mut now, mut next) = (vec![[0.0; 3]; width], vec![[0.0; 3]; width]);
     for (y, (from, to)) in rows.enumerate() {
-        next.fill([0.0; 3]);
-        for k in 0..from.len() {
-            let (x, ahead) = if y % 2 == 0 { (k, 1) } else { (from.len() - 1 - k, -1isize) };
-            let (p, a) = (from[x], alpha(from[x][3]));
-            if a == 0 {
-                to[x] = [0; 4];
-                continue;
-            }
-            let (codes, error) = settle(color(p), now[x + 1], p[3].min(1.0), levels);
-            to[x] = [codes[0], codes[1], codes[2], a];
-            let give = |row: &mut [Error], step: isize, share: f32| {
-                let at = &mut row[(x as isize + 1 + step) as usize];
-                *at = std::array::from_fn(|c| at[c] + share * error[c]);
-            };
-            give(&mut now, ahead, 7.0 / 16.0);
-            give(&mut next, -ahead, 3.0 / 16.0);
-            give(&mut next, 0, 5.0 / 16.0);
-            give(&mut next, ahead, 1.0 / 16.0);
+        if y % 2 == 0 {
+            diffuse_row(from, to, &now, &mut next, levels, color, |k| k);
+        } else {
+            diffuse_row(from, to, &now, &mut next, levels, color, |k| width - 1 - k);
         }
         std::mem::swap(&mut now, &mut next);
     }
+}
+
+/// One row, in the order that `at` gives; `below` is overwritten with what the next row receives.
+#[inline]
+fn diffuse_row(
+    from: &[[f32; 4]],
+    to: &mut [[u8; 4]],
+    above: &[Error],
+    below: &mut [Error],
+    levels: &Levels,
+    color: &impl Fn([f32; 4]) -> [f32; 3],
+    at: impl Fn(usize) -> usize,
+) {
+    // Sums for the pixel ahead, and for those below it and behind it, stay in registers until they are complete.
+    let [mut ahead, mut under, mut behind] = [[0.0; 3]; 3];
+    for k in 0..from.len() {
+        let x = at(k);
+        let (p, a) = (from[x], alpha(from[x][3]));
+        let mut error = [0.0; 3];
+        if a == 0 {
+            to[x] = [0; 4];
+        } else {
+            let received = sum(ahead, above[x]);
+            let codes;
+            (codes, error) = settle(color(p), received, p[3].min(1.0), levels);
+            to[x] = [codes[0], codes[1], codes[2], a];
+        }
+        // 7/16 ahead, 3/16 below behind, 5/16 below, 1/16 below ahead.
+        ahead = error.map(|e| e * (7.0 / 16.0));
+        if k > 0 {
+            below[at(k - 1)] = sum(behind, error.map(|e| e * (3.0 / 16.0)));
+        }
+        behind = sum(under, error.map(|e| e * (5.0 / 16.0)));
+        under = error.map(|e| e * (1.0 / 16.0));
+    }
+    if let Some(k) = from.len().checked_sub(1) {
+        below[at(k)] = behind;
+    }
+}
+
+#[inline]
+fn sum(a: Error, b: Error) -> Error {
+    std::array::from_fn(|c| a[c] + b[c])
 }
 
 /// The codes of a colour that received some error, and the error that it leaves.
 #[inline]
 fn settle(color: [f32; 3], received: Error, a: f32, levels: &Levels) -> ([u8; 3], Error) {
     let mut codes = [0; 3];
+    let per_alpha = 1.0 / a;
     // What a thin pixel is wrong by matters as much as it covers.
     let error = std::array::from_fn(|c| {
-        let wish = clip(clip(color[c]) + received[c] / a);
-        let (k, share) = levels.below(wish);
-        let k = k + usize::from(share > 0.5);
+        let wish = clip(clip(color[c]) + received[c] * per_alpha);
+        let k = levels.settle(wish);
         codes[c] = levels.codes[k];
         (wish - levels.lights[k]) * a
     });

@@ -28,7 +28,7 @@ Exit codes: 0 alike, 4 past a bound, 3 a file cannot be read.";
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// What it should be: a picture (PNG, JPEG, WebP), a film (GIF, APNG, WebP) or a folder of them.
+    /// What it should be: a picture (PNG, JPEG, WebP, EXR), a film (GIF, APNG, WebP) or a folder of them.
     expected: PathBuf,
     /// What it is: a file, or a folder if the other is one.
     actual: PathBuf,

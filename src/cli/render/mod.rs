@@ -102,7 +102,8 @@ fn plan(args: &Args, task: &Task) -> Result<Plan, Failure> {
         task.target.check_frames(frames.len()).map_err(|e| Failure::Usage(e.to_string()))?;
     }
     let settings = args.output.settings()?;
-    Ok(Plan { frames, size: [settings.width, settings.height] })
+    let whole = [settings.width, settings.height];
+    Ok(Plan { frames, size: args.camera.crop(whole)?.map_or(whole, |c| [c.width, c.height]) })
 }
 
 /// Draw the frames of a plan and write them.
@@ -131,6 +132,7 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         framing: args.camera.framing(asset)?,
         look: args.look.look(asset, |m| say.warn(m))?,
         overlays: args.overlay.overlays(asset, args.time.fps)?,
+        crop: args.camera.crop([settings.width, settings.height])?,
         settings,
     };
     let background = if args.sheet.is_transparent() { [0.0; 4] } else { desc.look.background };

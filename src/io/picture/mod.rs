@@ -18,6 +18,7 @@ mod atomic;
 mod delta;
 mod dither;
 mod exr;
+mod exr_read;
 mod film;
 mod format;
 mod gif;

@@ -69,7 +69,7 @@ impl Band<'_> {
 
     /// A place in the tile as a place in the band.
     fn at(&self, area: Area, place: usize) -> usize {
-        place / TILE * self.width + area.origin[0] as usize + place % TILE
+        place / TILE * self.width + area.to + place % TILE
     }
 
     /// Who has a pixel, and what of it has to be shaded.

@@ -110,7 +110,7 @@ impl Target<'_> {
             band.write(frame, area, seen);
             return true;
         }
-        let (rows, x, w) = (self.rows(), area.origin[0] as usize, area.w);
+        let (rows, x, w) = (self.rows(), area.to, area.w);
         let Target::Ids { width, objects, triangles, depth } = self else { return false };
         for (y, i) in (0..rows).flat_map(|y| (0..w).map(move |i| (y, i))) {
             let (from, to) = (y * TILE + i, y * *width + x + i);

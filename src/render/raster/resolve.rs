@@ -158,6 +158,8 @@ impl Entries {
 #[derive(Clone, Copy)]
 pub(super) struct Area {
     pub origin: [i32; 2],
+    /// The output's column that it starts at.
+    pub to: usize,
     pub w: usize,
     pub h: usize,
 }

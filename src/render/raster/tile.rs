@@ -9,6 +9,7 @@ use super::setup::{Bins, Fragment};
 use super::surface::Present;
 use super::{Stats, TILE};
 use crate::math::simd::{F8, I8, Kernel};
+use crate::render::Window;
 
 /// Working memory of one thread.
 #[derive(Debug, Default)]
@@ -26,6 +27,8 @@ pub(super) struct Row<'a, 'b> {
     pub frame: &'a Frame<'a>,
     pub bins: &'a [Bins],
     pub row: usize,
+    /// The part of the picture that the output shows.
+    pub tiles: Window,
     pub scratch: &'a mut TileScratch,
     pub target: &'a mut Target<'b>,
 }
@@ -35,7 +38,8 @@ impl Kernel for Row<'_, '_> {
 
     #[inline(always)]
     fn run(mut self) {
-        for column in 0..self.frame.tiles_x {
+        let tiles = self.tiles;
+        for column in tiles.x / TILE..(tiles.x + tiles.width).div_ceil(TILE) {
             self.tile(column);
         }
     }
@@ -47,16 +51,17 @@ impl Row<'_, '_> {
         let frame = self.frame;
         let index = self.row * frame.tiles_x + column;
         let (x, w) = (column * TILE, TILE.min(frame.width as usize - column * TILE));
+        let to = x - self.tiles.x;
         let empty = |b: &Bins| {
             let t = &b.tiles[index];
             t.fragments.is_empty() && t.solid.is_empty() && t.blend.is_empty()
         };
         if self.bins.iter().all(empty) {
-            return self.target.fill(x, w, frame.scene.background);
+            return self.target.fill(to, w, frame.scene.background);
         }
 
         // What is visible at each sample?
-        let area = Area { origin: [x as i32, (self.row * TILE) as i32], w, h: self.target.rows() };
+        let area = Area { origin: [x as i32, (self.row * TILE) as i32], to, w, h: self.target.rows() };
         self.scratch.seen.clear(frame.samples);
         for bins in self.bins {
             for &s in &bins.tiles[index].solid {
@@ -77,7 +82,7 @@ impl Row<'_, '_> {
             blend::blend(frame, self.bins, index, area, self.scratch);
             self.scratch.planes.average();
         }
-        self.target.write(x, w, &self.scratch.planes.c);
+        self.target.write(to, w, &self.scratch.planes.c);
     }
 
     /// An opaque or masked triangle into the buffer.
