@@ -42,9 +42,9 @@ fn rect(v: &Value) -> Rect {
     Rect { x: n("x"), y: n("y"), w: n("w"), h: n("h") }
 }
 
-/// A place with all that belongs to it.
+/// A place with all that belongs to it, everything moved on so that nothing is below zero.
 fn grown(r: &Rect, by: usize) -> Rect {
-    Rect { x: r.x - by, y: r.y - by, w: r.w + 2 * by, h: r.h + 2 * by }
+    Rect { x: r.x + 100 - by, y: r.y + 100 - by, w: r.w + 2 * by, h: r.h + 2 * by }
 }
 
 fn check_layout(layout: &Layout, sizes: &[[usize; 2]], m: Margins) {
