@@ -4,6 +4,7 @@ mod camera;
 mod light;
 mod material;
 mod mips;
+pub(crate) mod texels;
 mod texture;
 
 pub use camera::{Camera, CameraError, Projection};
