@@ -63,7 +63,7 @@
 //!
 //! ```
 //! # #[cfg(feature = "io")] {
-//! use sinew::frames::{Shot, View, Worker};
+//! use sinew::frames::{Shot, ShotDesc, View, Worker};
 //! use sinew::{image::Rgba8, io, render::Settings};
 //! let rig = br##"{
 //!   "sinew_rig": 1,
@@ -73,7 +73,7 @@
 //! let import = io::rig_json::import_bytes(rig, &io::Options::default(), &|_| Err(std::io::ErrorKind::NotFound.into())).unwrap();
 //! let settings = Settings { width: 32, height: 32, ..Settings::default() };
 //! let view = View::Orbit { yaw: 0.0, pitch: 0.0, fov_y: 0.5 };
-//! let shot = Shot::new(&import.asset, None, view, [0.0; 4], settings).unwrap();
+//! let shot = Shot::new(&import.asset, ShotDesc { view, settings, ..Default::default() }).unwrap();
 //! let mut picture = Rgba8::default();
 //! shot.draw(0.0, &mut Worker::default(), &mut picture);
 //! let covered = picture.data.chunks(4).filter(|p| p[3] > 0).count();
@@ -121,6 +121,11 @@ pub mod asset;
 pub mod render;
 
 pub mod frames;
+
+pub mod measure;
+
+#[cfg(feature = "pictures")]
+pub mod sheet;
 
 #[cfg(any(feature = "io", feature = "pictures"))]
 pub mod io;

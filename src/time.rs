@@ -4,9 +4,11 @@
 
 mod frame_set;
 mod rate;
+mod shard;
 
 pub use frame_set::{FrameSet, FrameSetError, frame_time};
 pub use rate::{Rate, RateError};
+pub use shard::{Shard, ShardError};
 
 /// A closed interval of seconds.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]

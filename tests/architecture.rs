@@ -24,7 +24,27 @@ const ROOMS: &[(&str, &[&str])] = &[
     // Where motion and look meet, so that character stays free of materials and importers can return both.
     ("asset", &["character", "scene", "skeleton"]),
     ("render", &["scene", "image", "mesh", "math"]),
-    ("frames", &["time", "skeleton", "pose", "fk", "skin", "character", "image", "scene", "asset", "render"]),
+    // A clip's keys are marked on the paths of bones; bones are drawn as meshes.
+    (
+        "frames",
+        &[
+            "time",
+            "skeleton",
+            "pose",
+            "clip",
+            "fk",
+            "mesh",
+            "skin",
+            "character",
+            "image",
+            "scene",
+            "asset",
+            "render",
+        ],
+    ),
+    ("measure", &["image"]),
+    // Frames side by side, wherever they came from: it cuts and copies, and never draws.
+    ("sheet", &["time", "image"]),
     // Formats: data rooms only, never frames or render.
     (
         "io",
@@ -41,13 +61,14 @@ const ROOMS: &[(&str, &[&str])] = &[
             "image",
             "scene",
             "asset",
+            "sheet",
         ],
     ),
 ];
 
 /// Files below one room that must not know each other.
 const STRANGERS: &[(&str, &[&str])] =
-    &[("skin", &["linear", "rigid"]), ("io", &["gltf", "notes", "picture", "rig_json"])];
+    &[("skin", &["linear", "rigid"]), ("io", &["gltf", "notes", "picture", "rig_json", "sheet_json"])];
 
 #[test]
 fn arrows_go_one_way() {

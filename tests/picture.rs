@@ -30,19 +30,29 @@ fn ball(size: [usize; 2], k: usize, background: [u8; 4]) -> Rgba8 {
 }
 
 fn film(size: [usize; 2], frames: u32, fps: u16) -> Film {
-    let rate = Rate::new(fps, 1).unwrap();
-    Film { size, frames, rate, plays: 0, transparent: false, matte: [255; 3] }
+    Film::new(size, frames, Rate::new(fps, 1).unwrap())
 }
 
 fn balls(size: [usize; 2], frames: usize, background: [u8; 4]) -> Vec<Rgba8> {
     (0..frames).map(|k| ball(size, k, background)).collect()
 }
 
+/// The bytes of a film.
+fn film_of(frames: &[Rgba8], film: Film, coding: &Coding) -> Result<(Vec<u8>, FilmReport), Error> {
+    let mut file = Cursor::new(Vec::new());
+    let mut writer = FilmWriter::new(&mut file, film, coding)?;
+    let mut encoder = FrameEncoder::new(film, coding);
+    for (k, frame) in frames.iter().enumerate() {
+        let before = k.checked_sub(1).map(|b| &frames[b]);
+        writer.write(encoder.encode(before, frame)?)?;
+    }
+    let report = writer.finish()?;
+    Ok((file.into_inner(), report))
+}
+
 fn gif_of(frames: &[Rgba8], film: Film, dither: Dither) -> (Vec<u8>, Palette, FilmReport) {
     let palette = Palette::from_frames(frames, 256, &film);
-    let mut writer = GifWriter::new(Vec::new(), film, &palette, dither).unwrap();
-    frames.iter().for_each(|f| writer.write(f).unwrap());
-    let (bytes, report) = writer.finish().unwrap();
+    let (bytes, report) = film_of(frames, film, &Coding::Gif(palette.clone(), dither)).unwrap();
     (bytes, palette, report)
 }
 
@@ -244,34 +254,171 @@ fn empty_and_transparent_films_have_palettes() {
     assert_eq!(play_gif(&bytes).frames, [clear.data]);
 }
 
+/// Every way to code a film.
+fn codings() -> [Coding; 4] {
+    let gif = Coding::Gif(Palette::new(vec![[0; 3]]), Dither::None);
+    [gif, Coding::Apng(PngLevel::Fast), Coding::Webp, Coding::Y4m]
+}
+
 #[test]
 fn films_take_the_frames_that_they_announced() {
     let frame = ball([8, 8], 0, [0, 0, 0, 255]);
     let film = film([8, 8], 2, 24);
-    let palette = Palette::new(vec![[0; 3]]);
-    let mut writer = GifWriter::new(Vec::new(), film, &palette, Dither::None).unwrap();
-    writer.write(&frame).unwrap();
-    let other = writer.write(&ball([9, 8], 0, [0; 4])).unwrap_err().to_string();
-    assert!(other.contains("frame 2") && other.contains("9 × 8, expected 8 × 8"), "{other}");
-    writer.write(&frame).unwrap();
-    assert!(matches!(writer.write(&frame), Err(Error::FrameCount { expected: 2, found: 3 })));
-    let writer = GifWriter::new(Vec::new(), film, &palette, Dither::None).unwrap();
-    assert!(matches!(writer.finish(), Err(Error::FrameCount { expected: 2, found: 0 })));
-    assert!(
-        apng_of(std::slice::from_ref(&frame), film).unwrap_err().to_string().contains("2 frames and got 1")
-    );
-    let slow = Film { rate: Rate::new(1, 1000).unwrap(), ..film };
-    assert!(matches!(GifWriter::new(Vec::new(), slow, &palette, Dither::None), Err(Error::TooSlow { .. })));
-    let wide = Film { size: [70_000, 1], ..film };
-    assert!(matches!(GifWriter::new(Vec::new(), wide, &palette, Dither::None), Err(Error::Size { .. })));
+    for coding in codings() {
+        let mut encoder = FrameEncoder::new(film, &coding);
+        let other = encoder.encode(None, &ball([9, 8], 0, [0; 4])).unwrap_err().to_string();
+        assert!(other.contains("9 × 8, expected 8 × 8"), "{other}");
+        let frames = [frame.clone(), frame.clone(), frame.clone()];
+        let of = |n: usize, film| film_of(&frames[..n], film, &coding);
+        assert!(matches!(of(3, film), Err(Error::FrameCount { expected: 2, found: 3 })));
+        assert!(matches!(of(1, film), Err(Error::FrameCount { expected: 2, found: 1 })));
+        assert!(matches!(of(0, Film { frames: 0, ..film }), Err(Error::FrameCount { .. })));
+        let wide = of(0, Film { size: [usize::MAX, 1], ..film });
+        assert!(matches!(wide, Err(Error::Size { .. })), "{coding:?}");
+        let name = coding.format().name();
+        for (rate, refused) in
+            [(Rate::new(1, 65535), ["GIF", "WebP"].contains(&name)), (Rate::new(1001, 1), name == "WebP")]
+        {
+            let made = of(2, Film { rate: rate.unwrap(), ..film });
+            let message = made.err().map(|e| e.to_string());
+            assert_eq!(message.is_some(), refused, "{message:?}");
+            assert!(message.is_none_or(|m| m.contains(name)));
+        }
+    }
 }
 
 fn apng_of(frames: &[Rgba8], film: Film) -> Result<Vec<u8>, Error> {
-    let mut bytes = Vec::new();
-    let mut writer = ApngWriter::new(&mut bytes, film, PngLevel::Fast)?;
-    frames.iter().try_for_each(|f| writer.write(f))?;
-    writer.finish()?;
-    Ok(bytes)
+    film_of(frames, film, &Coding::Apng(PngLevel::Fast)).map(|f| f.0)
+}
+
+/// Little-endian number of three bytes.
+fn u24(b: &[u8]) -> usize {
+    usize::from(b[0]) | usize::from(b[1]) << 8 | usize::from(b[2]) << 16
+}
+
+/// Chunks of a RIFF file, names and contents.
+fn riff(bytes: &[u8]) -> Vec<(&[u8], &[u8])> {
+    let mut chunks = Vec::new();
+    let mut rest = bytes;
+    while let Some((head, after)) = rest.split_first_chunk::<8>() {
+        let size = u32::from_le_bytes(head[4..].try_into().unwrap()) as usize;
+        chunks.push((&rest[..4], &after[..size]));
+        rest = &after[size + size % 2..];
+    }
+    assert!(rest.is_empty());
+    chunks
+}
+
+#[test]
+fn a_webp_film_is_lossless_and_as_long_as_it_should_be() {
+    use image::AnimationDecoder;
+    for (transparent, plays) in [(false, 0), (true, 3)] {
+        let background = if transparent { [0; 4] } else { [30, 60, 90, 255] };
+        let mut frames = balls([41, 30], 5, background);
+        frames.push(frames[4].clone());
+        let film = Film { transparent, plays, rate: "23.976".parse().unwrap(), ..film([41, 30], 6, 24) };
+        let (bytes, report) = film_of(&frames, film, &Coding::Webp).unwrap();
+        assert_eq!(report, FilmReport { frames: 6, dropped: 0 });
+        assert_eq!(bytes, film_of(&frames, film, &Coding::Webp).unwrap().0);
+        let decoder = image::codecs::webp::WebPDecoder::new(Cursor::new(&bytes)).unwrap();
+        assert!(decoder.has_animation());
+        let shown: Vec<image::Frame> = decoder.into_frames().collect_frames().unwrap();
+        assert_eq!(shown.len(), 6);
+        let delay = |f: &image::Frame| std::time::Duration::from(f.delay()).as_millis();
+        // 6 · 1001/24000 s, rounded once.
+        assert_eq!(shown.iter().map(delay).sum::<u128>(), 250);
+        for (k, frame) in frames.iter().enumerate() {
+            assert!(*shown[k].buffer().as_raw() == frame.data, "frame {k}");
+        }
+
+        // The container, by hand: sizes, loops, alpha, and no more pixels than what changed.
+        assert_eq!(u32::from_le_bytes(bytes[4..8].try_into().unwrap()) as usize, bytes.len() - 8);
+        let chunks = riff(&bytes[12..]);
+        assert_eq!((chunks[0].0, chunks[1].0), (&b"VP8X"[..], &b"ANIM"[..]));
+        assert_eq!(chunks[0].1, [if transparent { 0x12 } else { 2 }, 0, 0, 0, 40, 0, 0, 29, 0, 0]);
+        assert_eq!(chunks[1].1[4..], plays.to_le_bytes());
+        let sizes: Vec<usize> =
+            chunks[2..].iter().map(|(_, c)| (u24(&c[6..]) + 1) * (u24(&c[9..]) + 1)).collect();
+        assert!(sizes[0] == 41 * 30 && sizes[1] < 41 * 30 && sizes[5] == 1, "{sizes:?}");
+    }
+}
+
+#[test]
+fn a_webp_still_is_lossless_and_opaque_pictures_have_no_alpha() {
+    for (background, colour) in [([9, 9, 9, 255], image::ColorType::Rgb8), ([0; 4], image::ColorType::Rgba8)]
+    {
+        let picture = ball([61, 47], 2, background);
+        let bytes = encode_webp(&picture).unwrap();
+        assert_eq!(bytes, encode_webp(&picture).unwrap());
+        let back = image::load_from_memory(&bytes).unwrap();
+        assert_eq!(back.color(), colour);
+        assert!(back.into_rgba8().into_raw() == picture.data);
+    }
+    let wide = Rgba8 { width: 16385, height: 1, data: vec![0; 4 * 16385] };
+    assert!(encode_webp(&wide).unwrap_err().to_string().contains("1 to 16384"));
+}
+
+#[test]
+fn a_y4m_is_read_back_within_a_step() {
+    let frames = balls([32, 20], 3, [200, 60, 90, 255]);
+    let film = Film { rate: Rate::new(30000, 1001).unwrap(), ..film([32, 20], 3, 24) };
+    let (bytes, _) = film_of(&frames, film, &Coding::Y4m).unwrap();
+    let head = b"YUV4MPEG2 W32 H20 F30000:1001 Ip A1:1 C444 XCOLORRANGE=LIMITED\n";
+    assert_eq!(bytes[..head.len()], *head);
+    let body = bytes[head.len()..].chunks(6 + 3 * 640);
+    assert_eq!(body.len(), 3);
+    for (frame, planes) in frames.iter().zip(body) {
+        assert_eq!(planes[..6], *b"FRAME\n");
+        for (i, p) in frame.data.chunks(4).enumerate() {
+            let [y, b, r] = [0, 640, 1280].map(|plane| f64::from(planes[6 + plane + i]));
+            let (y, b, r) = ((y - 16.0) / 219.0, (b - 128.0) / 224.0, (r - 128.0) / 224.0);
+            let (red, blue) = (y + 1.5748 * r, y + 1.8556 * b);
+            let green = (y - 0.2126 * red - 0.0722 * blue) / 0.7152;
+            for (c, v) in [red, green, blue].into_iter().enumerate() {
+                assert!((255.0 * v - f64::from(p[c])).abs() <= 2.0, "{p:?} {v}");
+            }
+        }
+    }
+}
+
+#[test]
+fn an_exr_holds_the_numbers_themselves() {
+    use exr::prelude::*;
+    // Numbers of every kind, more rows than a block has, and noise that does not shrink.
+    let number = |i: u32| match i % 7 {
+        0 => -0.0,
+        1 => f32::MAX,
+        2 => 1e-40,
+        3 => f32::from_bits(i.wrapping_mul(0x9e37_79b9) & 0x7f7f_ffff),
+        _ => i as f32 * 1e-3,
+    };
+    for height in [1, 16, 37] {
+        let pixels: Vec<[f32; 4]> =
+            (0..13 * height).map(|i| [0, 1, 2, 3].map(|c| number(4 * i + c))).collect();
+        let picture = sinew::image::Image { width: 13, height: height as usize, pixels };
+        for depth in [ExrDepth::Float, ExrDepth::Half] {
+            let bytes = encode_exr(&picture, depth).unwrap();
+            assert_eq!(bytes, encode_exr(&picture, depth).unwrap());
+            let read = exr::image::read::read().no_deep_data().largest_resolution_level().all_channels();
+            let read = read.first_valid_layer().all_attributes();
+            let back = read.from_buffered(Cursor::new(&bytes)).unwrap();
+            let layer = back.layer_data;
+            assert_eq!(layer.size, Vec2(13, height as usize));
+            let names: Vec<String> = layer.channel_data.list.iter().map(|c| c.name.to_string()).collect();
+            assert_eq!(names, ["A", "B", "G", "R"]);
+            for (channel, c) in layer.channel_data.list.iter().zip([3, 2, 1, 0]) {
+                for (v, p) in channel.sample_data.values_as_f32().zip(&picture.pixels) {
+                    let same = match depth {
+                        ExrDepth::Float => v.to_bits() == p[c].to_bits(),
+                        ExrDepth::Half => v == f16::from_f32(p[c]).to_f32(),
+                    };
+                    assert!(same, "{depth:?}: {v:e} {:e}", p[c]);
+                }
+            }
+        }
+    }
+    let none = sinew::image::Image { width: 2, height: 2, pixels: vec![[0.0; 4]; 3] };
+    assert!(encode_exr(&none, ExrDepth::Float).unwrap_err().to_string().contains("OpenEXR"));
 }
 
 #[test]
@@ -312,15 +459,17 @@ fn half_written_files_never_appear() {
     let entries = || std::fs::read_dir(folder.path()).unwrap().count();
     let mut file = AtomicFile::create(&path, false, Folder::MustExist).unwrap();
     file.write_all(&[7; 100_000]).unwrap();
-    assert!(!path.exists() && entries() == 1);
+    assert!(!path.exists() && entries() <= 1);
     drop(file);
     assert_eq!(entries(), 0);
 
     // A film that breaks off leaves the old file as it was.
     AtomicFile::write(&path, b"old", false, Folder::MustExist).unwrap();
     let file = AtomicFile::create(&path, true, Folder::MustExist).unwrap();
-    let mut writer = ApngWriter::new(file, film([8, 8], 2, 24), PngLevel::Fast).unwrap();
-    writer.write(&ball([8, 8], 0, [0; 4])).unwrap();
+    let (film, coding) = (film([8, 8], 2, 24), Coding::Apng(PngLevel::Fast));
+    let mut writer = FilmWriter::new(file, film, &coding).unwrap();
+    let frame = FrameEncoder::new(film, &coding).encode(None, &ball([8, 8], 0, [0; 4]));
+    writer.write(frame.unwrap()).unwrap();
     assert!(writer.finish().is_err());
     assert_eq!((std::fs::read(&path).unwrap(), entries()), (b"old".to_vec(), 1));
 }

@@ -1,9 +1,10 @@
 //! Frames of the shipped characters: whole, in the picture, and the same on any number of threads.
 
-use sinew::frames::{Shot, View, Worker};
+use sinew::frames::{Look, Shot, ShotDesc, View, Worker};
 use sinew::image::Rgba8;
 use sinew::io::{self, Import, Options};
 use sinew::render::Settings;
+use sinew::render::channel::{Channel, Channels};
 use sinew::render::raster::IdImage;
 use std::path::PathBuf;
 
@@ -23,6 +24,13 @@ fn rigs() -> Vec<(String, Import)> {
     files.iter().map(load).collect()
 }
 
+/// A shot of a clip before a colour.
+fn shot(import: &Import, clip: usize, background: [f32; 4], settings: Settings) -> Shot<'_> {
+    let look = Look { background, ..Default::default() };
+    let desc = ShotDesc { clip: Some(clip), view: VIEW, look, settings, ..Default::default() };
+    Shot::new(&import.asset, desc).unwrap()
+}
+
 fn settings(samples: u8, threads: usize) -> Settings {
     Settings { width: 160, height: 120, samples, threads }
 }
@@ -36,7 +44,7 @@ fn every_character_has_at_least_one_clip_and_all_are_drawn_whole_and_inside() {
         let clips = import.asset.character.clips();
         assert!(!clips.is_empty(), "{name} does not move");
         for (c, clip) in clips.iter().enumerate() {
-            let shot = Shot::new(&import.asset, Some(c), VIEW, [0.0; 4], settings(1, 1)).unwrap();
+            let shot = shot(import, c, [0.0; 4], settings(1, 1));
             for k in 0..5 {
                 let t = clip.playback().duration() * k as f64 / 5.0;
                 shot.draw(t, &mut worker, &mut picture);
@@ -65,10 +73,9 @@ fn check(what: &str, picture: &Rgba8, ids: &IdImage) {
 fn threads_do_not_change_a_byte() {
     for (name, import) in &rigs() {
         let picture = |samples, threads| {
-            let shot =
-                Shot::new(&import.asset, Some(0), VIEW, [0.1, 0.2, 0.3, 1.0], settings(samples, threads));
+            let shot = shot(import, 0, [0.1, 0.2, 0.3, 1.0], settings(samples, threads));
             let mut out = Rgba8::default();
-            shot.unwrap().draw(0.3, &mut Worker::default(), &mut out);
+            shot.draw(0.3, &mut Worker::default(), &mut out);
             out
         };
         for samples in [1, 4] {
@@ -83,10 +90,27 @@ fn a_worker_that_drew_something_else_draws_the_same() {
     let rigs = rigs();
     let mut used = Worker::default();
     for (name, import) in &rigs {
-        let shot = Shot::new(&import.asset, Some(0), VIEW, [0.0; 4], settings(4, 1)).unwrap();
+        let shot = shot(import, 0, [0.0; 4], settings(4, 1));
         let (mut fresh, mut again) = (Rgba8::default(), Rgba8::default());
         shot.draw(0.2, &mut Worker::default(), &mut fresh);
         shot.draw(0.2, &mut used, &mut again);
         assert!(fresh == again, "{name}");
+    }
+}
+
+#[test]
+fn a_pixel_has_a_surface_exactly_where_it_has_alpha() {
+    let (mut worker, mut picture, mut seen) = (Worker::default(), Rgba8::default(), Channels::default());
+    for (name, import) in &rigs() {
+        for samples in [1, 4] {
+            let shot = shot(import, 0, [0.0; 4], settings(samples, 1));
+            shot.draw(0.2, &mut worker, &mut picture);
+            shot.draw_channels(0.2, &mut worker, &Channel::ALL, &mut seen);
+            for (i, p) in picture.data.as_chunks::<4>().0.iter().enumerate() {
+                let there = (seen.objects[i] > 0, seen.depth[i].is_finite(), seen.normals[i].length() > 0.9);
+                let alpha = p[3] > 0;
+                assert_eq!(there, (alpha, alpha, alpha), "{name}, {samples} samples, pixel {i}");
+            }
+        }
     }
 }

@@ -1,8 +1,9 @@
 //! The command line: parse, call the library, print, choose an exit code. No algorithm lives here.
 
+mod compare;
 mod eval;
-mod film;
 mod info;
+mod manifest;
 mod render;
 mod say;
 
@@ -19,7 +20,7 @@ Examples:
   sinew info fox.glb                              what is in a file
   sinew eval fox.glb --clip 0 --times 0,0.5       the numbers behind a picture
 
-Exit codes: 0 done, 1 failed while running, 2 wrong usage, 3 bad input file, 130 interrupted.
+Exit codes: 0 done, 1 failed while running, 2 wrong usage, 3 bad input file, 4 files differ, 130 interrupted.
 The variable NO_COLOR switches colours off.";
 
 /// Character animation: rigged glTF in, right frames out.
@@ -39,11 +40,15 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Draw a character: one picture, a numbered sequence or a film.
-    Render(render::Args),
+    Render(Box<render::Args>),
     /// Tell what is in a file: bones, meshes, clips, extensions, warnings.
     Info(info::Args),
     /// Print node matrices and vertex positions as JSON.
     Eval(eval::Args),
+    /// Tell how far pictures or films are from what they should be.
+    Compare(compare::Args),
+    /// Merge and check lists of what was written.
+    Manifest(manifest::Args),
     /// Print a completion script for a shell.
     #[command(
         after_help = "Example:\n  sinew completions bash > ~/.local/share/bash-completion/completions/sinew"
@@ -68,6 +73,35 @@ enum Failure {
     Usage(String),
     /// 3: the input file.
     Input(String),
+    /// 4: files are not what they should be.
+    Differs(String),
+}
+
+impl Failure {
+    fn message(&self) -> &str {
+        match self {
+            Failure::Run(m) | Failure::Usage(m) | Failure::Input(m) | Failure::Differs(m) => m,
+        }
+    }
+
+    /// Of two failures the one that says more: while running, then the input's, then the usage.
+    fn worse(self, other: Self) -> Self {
+        match (&self, &other) {
+            (Failure::Run(_), _) => self,
+            (_, Failure::Run(_)) => other,
+            (Failure::Input(_), _) => self,
+            _ => other,
+        }
+    }
+
+    fn with_message(self, message: String) -> Self {
+        match self {
+            Failure::Run(_) => Failure::Run(message),
+            Failure::Usage(_) => Failure::Usage(message),
+            Failure::Input(_) => Failure::Input(message),
+            Failure::Differs(_) => Failure::Differs(message),
+        }
+    }
 }
 
 /// Parse the arguments and do what they say.
@@ -78,6 +112,8 @@ pub fn run() -> ExitCode {
         Command::Render(args) => render::run(&args, &say),
         Command::Info(args) => info::run(&args, &say),
         Command::Eval(args) => eval::run(&args, &say),
+        Command::Compare(args) => compare::run(&args, &say),
+        Command::Manifest(args) => manifest::run(&args, &say),
         Command::Completions { shell } => completions(shell),
         Command::Man { subcommand } => manual(subcommand.as_deref()),
     };
@@ -86,6 +122,7 @@ pub fn run() -> ExitCode {
         Err(Failure::Run(m)) => (1, m),
         Err(Failure::Usage(m)) => (2, m),
         Err(Failure::Input(m)) => (3, m),
+        Err(Failure::Differs(m)) => (4, m),
     };
     say.error(&message);
     ExitCode::from(code)

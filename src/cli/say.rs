@@ -37,6 +37,11 @@ impl Say {
         }
     }
 
+    /// What was asked for by an option of its own, shown in any case.
+    pub fn report(&self, message: &str) {
+        tell(&plain(message));
+    }
+
     /// Something for the curious, shown with `-v`.
     pub fn detail(&self, message: &str) {
         if self.verbose {

@@ -1,42 +1,119 @@
 //! Times to pictures: the one place where animation meets rendering.
 
+mod bones;
+mod channels;
+mod effects;
+mod fit;
+mod framing;
+mod look;
+mod onion;
 mod ordered;
+mod overlay;
+mod path;
+mod pivot;
+mod stand;
+mod stroke;
 mod view;
+mod worker;
 
-pub use ordered::{Stop, in_order};
-pub use view::{Framing, View, ViewError};
+pub use framing::{Framing, Turns};
+pub use look::{GroundLook, Look, Shading, Shadows};
+pub use ordered::{Stop, in_order, in_order_pairs};
+pub use overlay::{BonesDesc, Onion, Overlays, PathDesc};
+pub use pivot::ground_point;
+pub use view::{FramingDesc, Pivot, View, ViewError};
+pub use worker::Worker;
 
 use crate::asset::Asset;
-use crate::character::{Instance, Scratch};
-use crate::fk::{self, Posed};
-use crate::image::Rgba8;
-use crate::pose::Pose;
-use crate::render::Settings;
-use crate::render::raster::{IdImage, Rasterizer, Stats};
-use crate::scene::{Camera, Light, LightKind, Material, Object, Scene};
+use crate::character::Instance;
+use crate::fk::Posed;
+use crate::image::develop::Developer;
+use crate::image::{Image, Rgba8};
+use crate::render::raster::{IdImage, Stats};
+use crate::render::{Settings, Window};
+use crate::scene::{Camera, Material, Object, Scene};
 use crate::skin::Deformed;
 use crate::time::{self, Range, Wrap};
-use glam::{Affine3A, DVec3, Vec3};
+use effects::Stage;
+use fit::Span;
+use glam::DVec3;
+use overlay::Layers;
+use stand::Stand;
+use std::time::{Duration, Instant};
 
-/// What is filmed and from where; fixed for all its frames.
+/// What is filmed, from where, and how it looks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShotDesc {
+    /// Which clip; the rest pose for `None`.
+    pub clip: Option<usize>,
+    /// What times outside the clip show.
+    pub wrap: Wrap,
+    /// Which camera.
+    pub view: View,
+    /// How it holds the character in its picture.
+    pub framing: FramingDesc,
+    /// Light and background.
+    pub look: Look,
+    /// What is drawn with the character.
+    pub overlays: Overlays,
+    /// Size and samples of the pictures.
+    pub settings: Settings,
+    /// The part of the pictures that is drawn: to the same bytes as in the whole.
+    pub crop: Option<Window>,
+}
+
+impl Default for ShotDesc {
+    /// The rest pose from the front, a little from above, before nothing.
+    fn default() -> Self {
+        Self {
+            clip: None,
+            wrap: Wrap::Clamp,
+            view: View::default(),
+            framing: FramingDesc::default(),
+            look: Look::default(),
+            overlays: Overlays::default(),
+            settings: Settings::default(),
+            crop: None,
+        }
+    }
+}
+
+/// One picture of a shot.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Moment {
+    /// Seconds in the clip.
+    pub time: f64,
+    /// Radians by which an orbiting camera has walked on, its lights with it: turntables and sheets of directions. What it walks
+    /// around says [`FramingDesc::pivot`].
+    pub turn: f32,
+}
+
+impl From<f64> for Moment {
+    /// A time, without a turn.
+    fn from(time: f64) -> Self {
+        Self { time, turn: 0.0 }
+    }
+}
+
+/// A shot that was set up: draws any of its moments.
 #[derive(Clone, Debug)]
 pub struct Shot<'a> {
     asset: &'a Asset,
-    clip: Option<usize>,
-    view: View,
-    orbit: Camera,
-    background: [f32; 4],
-    settings: Settings,
-    wrap: Wrap,
+    desc: ShotDesc,
+    stand: Stand<'a>,
+    layers: Layers,
     range: Range,
     /// The asset's materials, and the one that meshes without a material wear.
     materials: Vec<Material>,
     /// The world point that the scene's frame has its origin at.
     center: DVec3,
+    /// What the look needs beside the scene itself.
+    stage: Option<Stage>,
+    developer: Developer,
 }
 
 /// What a frame cost.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct FrameStats {
     /// Bones evaluated.
     pub bones: usize,
@@ -44,88 +121,163 @@ pub struct FrameStats {
     pub vertices: usize,
     /// What the rasterizer counted.
     pub raster: Stats,
+    /// Where the time went.
+    pub times: Times,
+}
+
+/// Time a stage, by the wall's clock.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Times {
+    /// Sampling the clip and forward kinematics.
+    pub pose: Duration,
+    /// Morphing and skinning.
+    pub deform: Duration,
+    /// Scene to pixels.
+    pub draw: Duration,
+}
+
+impl std::ops::AddAssign for FrameStats {
+    fn add_assign(&mut self, o: Self) {
+        self.bones += o.bones;
+        self.vertices += o.vertices;
+        self.raster += o.raster;
+        self.times.pose += o.times.pose;
+        self.times.deform += o.times.deform;
+        self.times.draw += o.times.draw;
+    }
 }
 
 impl<'a> Shot<'a> {
-    /// Set up a shot of `clip` (rest for `None`). With [`View::Orbit`] the camera stands so that no vertex leaves the picture
+    /// Set up a shot. With [`View::Orbit`] the camera stands so that no vertex leaves the picture
     /// at any of the moments looked at: each 24th of a second of the whole clip, more thinly spread only where that would be
     /// more than [`Framing::VERTICES`] vertices in all. Which frames are drawn later makes no difference.
     ///
-    /// `background` is linear RGBA, alpha premultiplied.
-    ///
     /// # Errors
-    /// [`ViewError`] if the asset has no such camera.
+    /// [`ViewError`] if the asset has no such camera or bone, or if the view leaves no picture plane.
     ///
     /// # Panics
     /// If the asset has no such clip.
-    pub fn new(
-        asset: &'a Asset,
-        clip: Option<usize>,
-        view: View,
-        background: [f32; 4],
-        settings: Settings,
-    ) -> Result<Self, ViewError> {
-        let mut materials = asset.materials.clone();
-        materials.push(Material::default());
-        let aspect = settings.width as f32 / settings.height.max(1) as f32;
-        let range = clip.map(|c| asset.character.clips()[c].playback()).unwrap_or_default();
+    pub fn new(asset: &'a Asset, desc: ShotDesc) -> Result<Self, ViewError> {
+        let materials = look::materials(asset, &desc.look);
+        let aspect = aspect(&desc.settings);
+        let range = desc.clip.map(|c| asset.character.clips()[c].playback()).unwrap_or_default();
         let mut worker = Worker::default();
-        worker.evaluate(asset, clip, range.start);
+        worker.evaluate(asset, desc.clip, range.start);
         let center = asset.character.center(&worker.posed);
-        let framing = match view {
-            View::Orbit { yaw, pitch, fov_y } => {
-                let mut framing = Framing::new(yaw, pitch, fov_y, aspect);
-                fit(asset, clip, center, &mut worker, &mut framing);
-                framing
-            }
-            View::Mounted(camera) if camera >= asset.cameras.len() => {
-                return Err(ViewError { camera, count: asset.cameras.len() });
-            }
-            View::Mounted(_) => Framing::new(0.0, 0.0, 1.0, aspect),
-        };
-        let orbit = framing.camera();
-        Ok(Self {
-            asset,
-            clip,
-            view,
-            orbit,
-            background,
-            settings,
-            wrap: Wrap::Clamp,
-            range,
-            materials,
-            center,
-        })
+        let span = Span { asset, clip: desc.clip, center };
+        let stand = Stand::new(&span, &desc.view, desc.framing, aspect, &mut worker)?;
+        let stage = Stage::new(&span, &desc.look, &materials, &mut worker);
+        let layers = Layers::new(&span, &desc.overlays, &mut worker)?;
+        let developer = desc.look.grade.developer();
+        Ok(Self { asset, desc, stand, range, materials, center, stage, layers, developer })
     }
 
-    /// The same shot with another meaning of times outside the clip; they hold its ends otherwise.
-    pub fn wrapped(self, wrap: Wrap) -> Self {
-        Self { wrap, ..self }
+    /// What was asked for.
+    pub fn desc(&self) -> &ShotDesc {
+        &self.desc
     }
 
-    /// Draw the moment `t` (seconds) with the buffers of `worker`.
-    pub fn draw(&self, t: f64, worker: &mut Worker, out: &mut Rgba8) -> FrameStats {
-        worker.evaluate(self.asset, self.clip, time::wrap(t, self.range, self.wrap));
-        worker.deform(self.asset, self.center);
-        let scene = self.scene(&worker.posed, &worker.deformed);
-        let raster = worker.rasterizer.draw(&scene, &self.settings, out);
-        let vertices = worker.deformed.iter().map(|d| d.positions.len()).sum();
-        FrameStats { bones: worker.posed.len(), vertices, raster }
+    /// Seconds of the clip.
+    pub fn range(&self) -> Range {
+        self.range
     }
 
-    /// Which object and triangle is seen at the centre of each pixel of the moment `t`, and how far away.
+    /// Where the character stands in the world over the shot's clip: [`ground_point`].
+    pub fn ground_point(&self) -> DVec3 {
+        ground_point(self.asset, self.desc.clip)
+    }
+
+    /// Names of the objects that pixels may show, in order: those of the meshes that the character's instances wear.
+    pub fn object_names(&self) -> Vec<String> {
+        let character = &self.asset.character;
+        character.instances().iter().map(|i| character.mesh(i).name.clone()).collect()
+    }
+
+    /// Pixels a row, and rows, of its pictures.
+    pub fn size(&self) -> [usize; 2] {
+        let part = self.part(self.desc.crop);
+        [part.width, part.height]
+    }
+
+    /// What of a window is in the picture; all of it for `None`.
+    fn part(&self, window: Option<Window>) -> Window {
+        let Settings { width, height, .. } = self.desc.settings;
+        window.unwrap_or(Window { x: 0, y: 0, width, height }).within(width, height)
+    }
+
+    /// Draw a moment with the buffers of `worker`.
+    pub fn draw(&self, moment: impl Into<Moment>, worker: &mut Worker, out: &mut Rgba8) -> FrameStats {
+        if self.desc.look.is_direct() && self.desc.overlays.is_empty() {
+            return self
+                .with_scene(moment.into(), worker, |scene, w| w.draw(scene, &self.desc.settings, out));
+        }
+        // What a grade makes of a pixel may depend on its neighbours and on its place.
+        let window = self.desc.crop.filter(|_| self.desc.look.is_direct());
+        let mut light = std::mem::take(&mut worker.light);
+        let stats = self.draw_layers(moment.into(), worker, window, &mut light);
+        self.developer.develop(&light, out);
+        worker.light = light;
+        if window != self.desc.crop {
+            self.part(self.desc.crop).cut(4, out.width, &mut out.data);
+            [out.width, out.height] = self.size();
+        }
+        stats
+    }
+
+    /// Draw a moment in linear light, alpha premultiplied. The look's grade is not applied.
+    pub fn draw_linear(&self, moment: impl Into<Moment>, worker: &mut Worker, out: &mut Image) -> FrameStats {
+        let window = self.desc.crop.filter(|_| self.stage.is_none());
+        let stats = self.draw_layers(moment.into(), worker, window, out);
+        if window != self.desc.crop {
+            self.part(self.desc.crop).cut(1, out.width, &mut out.pixels);
+            [out.width, out.height] = self.size();
+        }
+        stats
+    }
+
+    /// Which object and triangle is seen at the centre of each pixel of a moment, and how far away.
     ///
     /// Objects are the character's mesh instances, in order.
-    pub fn draw_ids(&self, t: f64, worker: &mut Worker, out: &mut IdImage) -> FrameStats {
-        worker.evaluate(self.asset, self.clip, time::wrap(t, self.range, self.wrap));
-        worker.deform(self.asset, self.center);
-        let scene = self.scene(&worker.posed, &worker.deformed);
-        let raster = worker.rasterizer.draw_ids(&scene, &self.settings, out);
-        let vertices = worker.deformed.iter().map(|d| d.positions.len()).sum();
-        FrameStats { bones: worker.posed.len(), vertices, raster }
+    pub fn draw_ids(&self, moment: impl Into<Moment>, worker: &mut Worker, out: &mut IdImage) -> FrameStats {
+        self.with_scene(moment.into(), worker, |scene, w| w.draw_ids(scene, &self.desc.settings, out))
     }
 
-    fn scene<'s>(&'s self, posed: &Posed, deformed: &'s [Deformed]) -> Scene<'s> {
+    /// Pose and deform the character, and hand the scene of the moment to a renderer.
+    fn with_scene(
+        &self,
+        moment: Moment,
+        worker: &mut Worker,
+        draw: impl FnOnce(&Scene, &mut crate::render::raster::Rasterizer) -> Stats,
+    ) -> FrameStats {
+        let mut stats = FrameStats::default();
+        self.pose(moment.time, worker, &mut stats);
+        let start = Instant::now();
+        let camera = self.stand.camera(moment, &worker.posed, &worker.deformed);
+        let scene = self.scene(camera, &worker.posed, &worker.deformed);
+        worker.rasterizer.set_window(self.desc.crop);
+        stats.raster = draw(&scene, &mut worker.rasterizer);
+        stats.times.draw = start.elapsed();
+        stats
+    }
+
+    /// Pose and deform the character.
+    fn pose(&self, time: f64, worker: &mut Worker, stats: &mut FrameStats) {
+        let start = Instant::now();
+        worker.evaluate(self.asset, self.desc.clip, time::wrap(time, self.range, self.desc.wrap));
+        let posed = Instant::now();
+        worker.deform(self.asset, self.center);
+        stats.bones += worker.posed.len();
+        stats.vertices += worker.deformed.iter().map(|d| d.positions.len()).sum::<usize>();
+        stats.times.pose += posed - start;
+        stats.times.deform += posed.elapsed();
+    }
+
+    /// Width over height.
+    fn aspect(&self) -> f32 {
+        aspect(&self.desc.settings)
+    }
+
+    fn scene<'s>(&'s self, camera: Camera, posed: &Posed, deformed: &'s [Deformed]) -> Scene<'s> {
         let character = &self.asset.character;
         let plain = self.materials.len() - 1;
         let object = |(inst, d): (&Instance, &'s Deformed)| {
@@ -134,114 +286,28 @@ impl<'a> Shot<'a> {
             Object {
                 mesh,
                 positions: &d.positions,
-                normals: &d.normals,
+                normals: if self.desc.look.shading == Shading::Facets { &[] } else { &d.normals },
                 tangents: &d.tangents,
                 material,
                 mirrored: d.mirrored,
             }
         };
-        let camera = self.camera(posed);
-        let (ambient, lights) = self.lights(posed, &camera);
+        let look = &self.desc.look;
+        let lit = look::lights(look, &self.asset.lights, posed, self.center, &camera);
         Scene {
             camera,
-            ambient,
-            lights,
-            background: self.background,
+            ambient: lit.ambient,
+            lights: lit.lights,
+            style: lit.style,
+            background: look.background,
             objects: character.instances().iter().zip(deformed).map(object).collect(),
             materials: &self.materials,
             textures: &self.asset.textures,
         }
     }
-
-    fn camera(&self, posed: &Posed) -> Camera {
-        let View::Mounted(index) = self.view else { return self.orbit };
-        let mounted = &self.asset.cameras[index];
-        // A scaled bone carries its camera, but does not distort it.
-        let (_, rotation, translation) =
-            posed.near(mounted.bone, self.center).to_scale_rotation_translation();
-        Camera {
-            scene_from_view: Affine3A::from_rotation_translation(rotation, translation),
-            projection: mounted.projection,
-            near: mounted.near,
-            far: mounted.near * 1e6,
-        }
-    }
-
-    /// The asset's lamps under a faint sky, or a key and a fill light that stand with the camera.
-    fn lights(&self, posed: &Posed, camera: &Camera) -> (Vec3, Vec<Light>) {
-        if !self.asset.lights.is_empty() {
-            let carried = self.asset.lights.iter().map(|m| carry(&m.light, &posed.near(m.bone, self.center)));
-            return (Vec3::splat(0.08), carried.collect());
-        }
-        let lamp = |from: Vec3, color: Vec3| {
-            let direction = -camera.scene_from_view.transform_vector3(from.normalize());
-            Light { kind: LightKind::Directional { direction }, color }
-        };
-        let key = lamp(Vec3::new(-0.55, 0.75, 0.65), Vec3::new(0.92, 0.9, 0.86));
-        let fill = lamp(Vec3::new(0.9, 0.15, 0.5), Vec3::new(0.2, 0.22, 0.26));
-        (Vec3::new(0.25, 0.26, 0.28), vec![key, fill])
-    }
 }
 
-/// Widen `framing` until it holds the whole clip.
-fn fit(asset: &Asset, clip: Option<usize>, center: DVec3, worker: &mut Worker, framing: &mut Framing) {
-    let range = clip.map(|c| asset.character.clips()[c].playback()).unwrap_or_default();
-    // A moment each 24th of a second, both ends included; long clips of large meshes are looked at more thinly.
-    let vertices: usize =
-        asset.character.instances().iter().map(|i| asset.character.mesh(i).positions.len()).sum();
-    let most = (Framing::VERTICES / vertices.max(1)).clamp(Framing::FEWEST, Framing::MOST);
-    let moments = (range.duration() * 24.0).clamp(0.0, (most - 1) as f64).ceil() as usize + 1;
-    let mut positions = Vec::new();
-    for k in 0..moments {
-        let t = range.start + range.duration() * k as f64 / (moments - 1).max(1) as f64;
-        worker.evaluate(asset, clip, t);
-        for (i, inst) in asset.character.instances().iter().enumerate() {
-            if !asset.character.mesh(inst).triangles.is_empty() {
-                let Worker { pose, posed, scratch, .. } = worker;
-                asset.character.positions(i, pose, posed, center, scratch, &mut positions);
-                framing.include(&positions);
-            }
-        }
-    }
-}
-
-/// A lamp in the frame of a bone, in the scene's frame.
-fn carry(light: &Light, scene_from_bone: &Affine3A) -> Light {
-    let turn = |d: Vec3| scene_from_bone.transform_vector3(d).normalize_or(Vec3::NEG_Z);
-    let mut light = *light;
-    match &mut light.kind {
-        LightKind::Directional { direction } => *direction = turn(*direction),
-        LightKind::Point { position, .. } => *position = scene_from_bone.transform_point3(*position),
-        LightKind::Spot { position, direction, .. } => {
-            *position = scene_from_bone.transform_point3(*position);
-            *direction = turn(*direction);
-        }
-    }
-    light
-}
-
-/// Buffers that one thread uses again from frame to frame.
-#[derive(Default)]
-pub struct Worker {
-    pose: Pose,
-    posed: Posed,
-    scratch: Scratch,
-    deformed: Vec<Deformed>,
-    rasterizer: Rasterizer,
-}
-
-impl Worker {
-    fn evaluate(&mut self, asset: &Asset, clip: Option<usize>, t: f64) {
-        let character = &asset.character;
-        self.pose = character.pose(clip, t);
-        fk::forward(character.skeleton(), &self.pose, &mut self.posed);
-    }
-
-    fn deform(&mut self, asset: &Asset, center: DVec3) {
-        let character = &asset.character;
-        self.deformed.resize_with(character.instances().len(), Deformed::default);
-        for (i, out) in self.deformed.iter_mut().enumerate() {
-            character.deform(i, &self.pose, &self.posed, center, &mut self.scratch, out);
-        }
-    }
+/// Width over height of a picture.
+fn aspect(settings: &Settings) -> f32 {
+    settings.width as f32 / settings.height.max(1) as f32
 }

@@ -61,6 +61,14 @@ pub fn encode_srgb8(p: [f32; 4]) -> [u8; 4] {
     [srgb8(p[0] * k), srgb8(p[1] * k), srgb8(p[2] * k), alpha]
 }
 
+/// 8-bit sRGB with straight alpha as linear, premultiplied light.
+#[inline]
+pub fn decode_srgb8(p: [u8; 4]) -> [f32; 4] {
+    let a = f32::from(p[3]) / 255.0;
+    let light = |c: u8| LINEAR_OF_SRGB8[usize::from(c)] * a;
+    [light(p[0]), light(p[1]), light(p[2]), a]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,6 +3,12 @@
 #[cfg(feature = "io")]
 pub mod gltf;
 #[cfg(feature = "io")]
+mod json_color;
+#[cfg(feature = "io")]
+pub mod look_json;
+#[cfg(all(feature = "io", feature = "pictures"))]
+pub mod manifest;
+#[cfg(feature = "io")]
 pub mod notes;
 #[cfg(feature = "pictures")]
 pub mod picture;
@@ -10,6 +16,8 @@ pub mod picture;
 pub mod ply;
 #[cfg(feature = "io")]
 pub mod rig_json;
+#[cfg(all(feature = "io", feature = "pictures"))]
+pub mod sheet_json;
 
 use crate::asset::Asset;
 

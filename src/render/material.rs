@@ -2,6 +2,7 @@
 
 use super::sample::{self, Uv};
 use super::shade::{self, Surface};
+use super::styled;
 use crate::math::simd::{self, F8, I8, Isa, V8};
 use crate::scene::{AlphaMode, Material, Scene, TextureRef};
 use glam::Affine2;
@@ -125,6 +126,9 @@ pub(crate) fn light(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> (
         openness,
         emissive,
     };
+    if !scene.style.is_plain() {
+        return (styled::light(isa, &surface, scene), alpha);
+    }
     (shade::blinn_phong(&surface, scene.ambient, &scene.lights), alpha)
 }
 
@@ -136,6 +140,12 @@ fn highlight(maps: &Maps, m: &Material) -> (V8, F8) {
         Some(t) => (k_s * V8 { x: t[0], y: t[1], z: t[2] }, simd::pow(shininess, t[3])),
         None => (k_s, shininess),
     }
+}
+
+/// The shading normal, normal map included, scene space.
+#[inline(always)]
+pub(crate) fn shading_normal(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> V8 {
+    normal(&Maps::new(isa, scene, m, p), m, p)
 }
 
 /// The shading normal, on the eye's side.

@@ -1,6 +1,6 @@
 //! Lamps.
 
-use glam::Vec3;
+use glam::{Affine3A, Vec3};
 
 /// Where light comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,4 +40,21 @@ pub struct Light {
     pub kind: LightKind,
     /// `I`: linear RGB.
     pub color: Vec3,
+}
+
+impl Light {
+    /// The lamp carried from one frame into another. Directions keep unit length; one without length points along −z.
+    pub fn carried(&self, frame: &Affine3A) -> Self {
+        let turn = |d: Vec3| frame.transform_vector3(d).normalize_or(Vec3::NEG_Z);
+        let mut light = *self;
+        match &mut light.kind {
+            LightKind::Directional { direction } => *direction = turn(*direction),
+            LightKind::Point { position, .. } => *position = frame.transform_point3(*position),
+            LightKind::Spot { position, direction, .. } => {
+                *position = frame.transform_point3(*position);
+                *direction = turn(*direction);
+            }
+        }
+        light
+    }
 }

@@ -2,14 +2,22 @@
 
 mod camera;
 mod light;
+mod lighting;
 mod material;
 mod mips;
+mod patch;
+mod shadow;
+mod style;
 pub(crate) mod texels;
 mod texture;
 
 pub use camera::{Camera, CameraError, Projection};
 pub use light::{Light, LightKind};
+pub use lighting::{Lamp, LampFrame, Lighting};
 pub use material::{AlphaMode, Material, TextureRef};
+pub use patch::MaterialPatch;
+pub use shadow::ShadowMap;
+pub use style::Style;
 pub use texture::{Content, Filter, Texture, TextureError, TextureId, WrapMode};
 
 use crate::mesh::Mesh;
@@ -41,6 +49,8 @@ pub struct Scene<'a> {
     pub ambient: Vec3,
     /// Lamps.
     pub lights: Vec<Light>,
+    /// How light is turned into colour.
+    pub style: Style<'a>,
     /// Linear RGBA behind everything, alpha premultiplied.
     pub background: [f32; 4],
     /// Surfaces.

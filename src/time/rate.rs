@@ -77,8 +77,18 @@ impl Rate {
 
     /// When the frame after `frames` others starts, rounded to 1/100 s: differences of these are delays without drift.
     pub fn centiseconds(self, frames: u32) -> u64 {
-        let (n, d) = (u128::from(frames) * 100 * u128::from(self.seconds), u128::from(self.frames));
-        // At most 2³² · 100 · 2¹⁶ < 2⁶⁴.
+        self.ticks(frames, 100)
+    }
+
+    /// The same in 1/1000 s.
+    pub fn milliseconds(self, frames: u32) -> u64 {
+        self.ticks(frames, 1000)
+    }
+
+    /// `frames / fps` in parts of a second, rounded to the nearest.
+    fn ticks(self, frames: u32, parts: u128) -> u64 {
+        let (n, d) = (u128::from(frames) * parts * u128::from(self.seconds), u128::from(self.frames));
+        // At most 2³² · 1000 · 2¹⁶ < 2⁶⁴.
         ((2 * n + d) / (2 * d)) as u64
     }
 }
@@ -158,6 +168,7 @@ mod tests {
         let rate = Rate::new(60, 1).unwrap();
         assert_eq!([0, 1, 2, 3, 60].map(|k| rate.centiseconds(k)), [0, 2, 3, 5, 100]);
         assert_eq!(Rate::new(24000, 1001).unwrap().centiseconds(24_000), 100_100);
+        assert_eq!([1, 2, 3, 60].map(|k| rate.milliseconds(k)), [17, 33, 50, 1000]);
         assert_eq!(Rate::new(1, 65535).unwrap().centiseconds(u32::MAX), u64::from(u32::MAX) * 6_553_500);
     }
 }

@@ -4,7 +4,7 @@ use glam::Vec3;
 use sinew::image::Rgba8;
 use sinew::mesh::{Mesh, MeshData};
 use sinew::render::{Settings, raster::Rasterizer};
-use sinew::scene::{Camera, Light, LightKind, Material, Object, Projection, Scene};
+use sinew::scene::{Camera, Light, LightKind, Material, Object, Projection, Scene, Style};
 use std::f32::consts::PI;
 use std::time::Instant;
 
@@ -56,6 +56,7 @@ fn main() {
             camera,
             ambient: Vec3::splat(0.05),
             lights: vec![light],
+            style: Style::default(),
             background: [0.0; 4],
             objects: vec![object],
             materials: &material,

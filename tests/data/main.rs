@@ -1,9 +1,11 @@
 //! Promises checked on third-party files, found in `SINEW_DATA` or `../shared/data`.
 //!
-//! Without the files every test here is reported as ignored; with `SINEW_DATA` set to a missing folder the run fails.
+//! Without the files every test here is reported as ignored, as is a test whose tool is missing (under `CI` both fail); with `SINEW_DATA` set to a missing folder the run fails.
 
+mod farm;
 mod gltf_mutations;
 mod gltf_oracle;
+mod images;
 mod invalid;
 mod notes;
 #[path = "../../src/test_rng.rs"]
@@ -21,6 +23,10 @@ fn main() {
         let run = move || test(dir.as_deref().expect("ignored without data")).map_err(Into::into);
         trials.push(Trial::test(*name, run).with_ignored_flag(data.is_none()));
     }
+    trials.push(
+        Trial::test("four_shards_by_gnu_parallel_are_the_whole", || farm::run().map_err(Into::into))
+            .with_ignored_flag(!farm::possible()),
+    );
     libtest_mimic::run(&Arguments::from_args(), trials).exit();
 }
 
@@ -34,6 +40,11 @@ const TESTS: &[(&str, Test)] = &[
     ("notes::rest_is_the_identity", notes::rest_is_the_identity),
     ("notes::surfaces_are_counted", notes::surfaces_are_counted),
     ("notes::cut_rigs_are_refused", notes::cut_rigs_are_refused),
+    ("notes::pixels_move_as_in_the_notes", images::pixels_move_as_in_the_notes),
+    ("notes::grays_are_those_of_the_notes", images::grays_are_those_of_the_notes),
+    ("notes::the_mosaic_is_that_of_the_notes", images::the_mosaic_is_that_of_the_notes),
+    ("notes::hues_are_those_of_the_notes", images::hues_are_those_of_the_notes),
+    ("notes::layers_are_composited_as_in_the_notes", images::layers_are_composited_as_in_the_notes),
     ("changed_bytes_never_panic", gltf_mutations::run),
     ("broken_files_are_refused_politely", invalid::run),
     ("the_program_survives_broken_files", invalid::program),

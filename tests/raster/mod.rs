@@ -11,7 +11,7 @@ use sinew::image::{Image, Rgba8};
 use sinew::mesh::{Mesh, MeshData};
 use sinew::render::Settings;
 use sinew::render::raster::{IdImage, Rasterizer, Stats};
-use sinew::scene::{AlphaMode, Camera, Light, Material, Object, Projection, Scene, Texture};
+use sinew::scene::{AlphaMode, Camera, Light, Material, Object, Projection, Scene, Style, Texture};
 
 /// A scene that owns what it shows.
 pub struct Stage {
@@ -83,6 +83,7 @@ impl Stage {
             camera: self.camera,
             ambient: self.ambient,
             lights: self.lights.clone(),
+            style: Style::default(),
             background: self.background,
             objects,
             materials: &self.materials,

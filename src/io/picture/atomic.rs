@@ -1,9 +1,10 @@
 //! Files that appear when they are complete, or not at all.
 
 use super::Error;
+use super::unnamed;
 use std::collections::BTreeSet;
 use std::fs;
-use std::io::{self, Write};
+use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -20,7 +21,9 @@ pub enum Folder {
 /// A file that is written beside its target and takes its name in [`commit`](AtomicFile::commit).
 ///
 /// Dropped before that, it leaves nothing behind, and what stood there before stays. The permissions are those of any
-/// new file (0666 less the umask), or those of the file that it replaces. A symbolic link is followed.
+/// new file (0666 less the umask), or those of the file that it replaces. A symbolic link is followed. Where the file system
+/// can (Linux), the file has no name at all until it is complete, so that not even a killed process leaves a trace;
+/// elsewhere it is called `.sinew-….tmp` meanwhile.
 ///
 /// ```
 /// # use std::io::Write;
@@ -42,7 +45,55 @@ pub struct AtomicFile {
     target: PathBuf,
     overwrite: bool,
     /// `None` once committed.
-    file: Option<io::BufWriter<tempfile::NamedTempFile>>,
+    file: Option<io::BufWriter<Temporary>>,
+}
+
+/// A file on its way.
+#[derive(Debug)]
+enum Temporary {
+    Named(tempfile::NamedTempFile),
+    Unnamed(fs::File),
+}
+
+impl Temporary {
+    fn file(&self) -> &fs::File {
+        match self {
+            Self::Named(f) => f.as_file(),
+            Self::Unnamed(f) => f,
+        }
+    }
+
+    fn path(&self) -> Option<PathBuf> {
+        match self {
+            Self::Named(f) => Some(f.path().to_owned()),
+            Self::Unnamed(_) => None,
+        }
+    }
+
+    /// Give it its name.
+    fn persist(self, target: &Path, overwrite: bool) -> io::Result<()> {
+        match self {
+            Self::Unnamed(f) => unnamed::name(&f, target, overwrite),
+            Self::Named(f) if overwrite => f.persist(target).map(drop).map_err(|e| e.error),
+            Self::Named(f) => f.persist_noclobber(target).map(drop).map_err(|e| e.error),
+        }
+    }
+}
+
+impl Write for Temporary {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file().write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file().flush()
+    }
+}
+
+impl Seek for Temporary {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file().seek(to)
+    }
 }
 
 /// The temporaries that exist now; `None` once the program is about to end.
@@ -99,20 +150,15 @@ impl AtomicFile {
     /// [`Error::Interrupted`]. The temporary is removed in every case.
     pub fn commit(mut self) -> Result<(), Error> {
         let Some(file) = self.file.take() else { return Ok(()) };
-        let temporary = file.get_ref().path().to_owned();
+        let temporary = file.get_ref().path();
         let flushed = file.into_inner().map_err(|e| self.error("write", e.into_error()));
         // The name changes under the lock, so that a clean-up sees the file either before or after.
         let mut list = lock();
         let Some(list) = list.as_mut() else { return Err(Error::Interrupted { path: self.path.clone() }) };
-        list.remove(&temporary);
-        let file = flushed?;
-        let named = match self.overwrite {
-            true => file.persist(&self.target).map(drop),
-            false => file.persist_noclobber(&self.target).map(drop),
-        };
-        named.map_err(|e| match e.error.kind() {
+        temporary.map(|path| list.remove(&path));
+        flushed?.persist(&self.target, self.overwrite).map_err(|e| match e.kind() {
             io::ErrorKind::AlreadyExists => Error::Exists { path: self.path.clone() },
-            _ => self.error("give the file its name", e.error),
+            _ => self.error("give the file its name", e),
         })
     }
 
@@ -138,13 +184,20 @@ impl Write for AtomicFile {
     }
 }
 
+impl Seek for AtomicFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        let file = self.file.as_mut().ok_or(io::ErrorKind::NotConnected)?;
+        file.seek(to).map_err(name_file(&self.path))
+    }
+}
+
 impl Drop for AtomicFile {
     fn drop(&mut self) {
         let Some(file) = self.file.take() else { return };
         let (temporary, _) = file.into_parts();
-        let path = temporary.path().to_owned();
+        let path = temporary.path();
         drop(temporary);
-        if let Some(list) = lock().as_mut() {
+        if let (Some(path), Some(list)) = (path, lock().as_mut()) {
             list.remove(&path);
         }
     }
@@ -173,11 +226,7 @@ fn prepare_folder(path: &Path, parent: &Path, folder: Folder) -> Result<(), Erro
 }
 
 /// A new temporary in `folder`, on the list before anybody can interrupt.
-fn open_beside(
-    path: &Path,
-    folder: &Path,
-    permissions: Option<fs::Permissions>,
-) -> Result<tempfile::NamedTempFile, Error> {
+fn open_beside(path: &Path, folder: &Path, permissions: Option<fs::Permissions>) -> Result<Temporary, Error> {
     let failed = |source| Error::Io { path: path.to_owned(), action: "create the file", source };
     let mut builder = tempfile::Builder::new();
     builder.prefix(".sinew-").suffix(".tmp");
@@ -186,10 +235,13 @@ fn open_beside(
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let mut list = lock();
     let Some(list) = list.as_mut() else { return Err(Error::Interrupted { path: path.to_owned() }) };
-    let file = builder.tempfile_in(folder).map_err(failed)?;
+    let file = match unnamed::create(folder) {
+        Some(file) => Temporary::Unnamed(file),
+        None => Temporary::Named(builder.tempfile_in(folder).map_err(failed)?),
+    };
     if let Some(permissions) = permissions {
-        file.as_file().set_permissions(permissions).map_err(failed)?;
+        file.file().set_permissions(permissions).map_err(failed)?;
     }
-    list.insert(file.path().to_owned());
+    list.extend(file.path());
     Ok(file)
 }

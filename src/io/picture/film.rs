@@ -1,5 +1,7 @@
 //! What every film has, whatever its format.
 
+use super::{Error, check_size};
+use crate::image::Rgba8;
 use crate::image::color::{LINEAR_OF_SRGB8, srgb8};
 use crate::time::Rate;
 
@@ -32,6 +34,40 @@ pub struct FilmReport {
 }
 
 impl Film {
+    /// An opaque film over white that repeats for ever.
+    pub fn new(size: [usize; 2], frames: u32, rate: Rate) -> Self {
+        Self { size, frames, rate, plays: 0, transparent: false, matte: [255; 3] }
+    }
+
+    /// Refuse sides that a format cannot say.
+    pub(super) fn check(&self, format: &'static str, limit: usize) -> Result<(), Error> {
+        let [width, height] = self.size;
+        match self.size.iter().all(|s| (1..=limit).contains(s)) {
+            true => Ok(()),
+            false => Err(Error::Size { width, height, bytes: 0, format, limit }),
+        }
+    }
+
+    /// Refuse a frame that is none, or that has another size.
+    pub(super) fn check_frame(&self, frame: &Rgba8, format: &'static str) -> Result<(), Error> {
+        check_size(frame, format, i32::MAX as usize)?;
+        let found = [frame.width, frame.height];
+        match found == self.size {
+            true => Ok(()),
+            false => Err(Error::FrameSize { expected: self.size, found }),
+        }
+    }
+
+    /// A frame laid over the matte.
+    pub(super) fn flattened(&self, frame: &Rgba8) -> Rgba8 {
+        let flat = |p: &[u8; 4]| {
+            let [r, g, b] = self.over_matte(*p);
+            [r, g, b, 255]
+        };
+        let pixels: Vec<[u8; 4]> = frame.data.as_chunks::<4>().0.iter().map(flat).collect();
+        Rgba8 { data: pixels.into_flattened(), ..*frame }
+    }
+
     /// A pixel laid over the matte in linear light; its own alpha is left out of it.
     ///
     /// `result = α·colour + (1 − α)·matte`

@@ -1,25 +1,22 @@
 //! GIF films, a frame at a time.
 
-use super::delta::{Rect, bounds};
-use super::dither::{Dither, Indexed, Mapper};
+use super::Error;
+use super::delta::{Rect, bounds, bounds_where};
+use super::dither::Indexed;
 use super::film::{Film, FilmReport};
 use super::palette::Palette;
-use super::{Error, check_size};
-use crate::image::Rgba8;
 use std::borrow::Cow;
 use std::io::Write;
 
 /// Writes a GIF; memory holds two frames, whatever the length of the film.
 ///
 /// A frame stores the rectangle that changed, with unchanged pixels transparent; decoded, the pictures are the same.
-/// Frame `k` (from 0) starts at `round(100·k/fps)` centiseconds, so the whole is as long as it should be. Browsers slow
-/// frames under 2 cs down to 10: above 50 frames a second those that would be so short are left out and counted in
-/// [`FilmReport::dropped`].
-pub struct GifWriter<W: Write> {
+/// Browsers slow frames under 2 cs down to 10: above 50 frames a second those that would be so short are left out.
+pub(super) struct GifWriter<W: Write> {
     encoder: ::gif::Encoder<W>,
     film: Film,
-    mapper: Mapper,
-    dither: Dither,
+    /// The palette's index of a hole.
+    hole: u8,
     /// What is shown before the waiting frame.
     canvas: Vec<u8>,
     /// A frame waits for the next one, which says how long it stays and what it must clear away.
@@ -37,17 +34,12 @@ struct Waiting {
 const LIMIT: u64 = u16::MAX as u64;
 
 impl<W: Write> GifWriter<W> {
-    /// Write the head of a film.
-    ///
-    /// # Errors
-    /// [`Error::Size`] for sides of 0 or above 65535, [`Error::TooSlow`], [`Error::Encode`].
-    pub fn new(out: W, film: Film, palette: &Palette, dither: Dither) -> Result<Self, Error> {
+    pub fn new(out: W, film: Film, palette: &Palette) -> Result<Self, Error> {
+        film.check("GIF", LIMIT as usize)?;
         let [width, height] = film.size;
-        if !film.size.iter().all(|s| (1..=LIMIT as usize).contains(s)) {
-            return Err(Error::Size { width, height, bytes: 0, format: "GIF", limit: LIMIT as usize });
-        }
         if film.rate.centiseconds(1) > LIMIT {
-            return Err(Error::TooSlow { rate: film.rate });
+            let rate = film.rate;
+            return Err(Error::TooSlow { rate, format: "GIF", longest: "655.35 s", least: "0.0016" });
         }
         // One more entry than colours: the transparent index.
         let table = [palette.colors().as_flattened(), &[0; 3]].concat();
@@ -59,56 +51,30 @@ impl<W: Write> GifWriter<W> {
             n => encoder.set_repeat(::gif::Repeat::Finite(n - 1)).map_err(failed)?,
         }
         let canvas = vec![palette.transparent(); width * height];
-        let (mapper, waiting) = (Mapper::new(palette, &film), None);
-        Ok(Self { encoder, film, mapper, dither, canvas, waiting, came: 0, report: FilmReport::default() })
+        let (hole, waiting) = (palette.transparent(), None);
+        Ok(Self { encoder, film, hole, canvas, waiting, came: 0, report: FilmReport::default() })
     }
 
-    /// Map a frame to the palette and add it.
-    ///
-    /// # Errors
-    /// [`Error::Size`], [`Error::FrameSize`], [`Error::FrameCount`], [`Error::Encode`].
-    pub fn write(&mut self, frame: &Rgba8) -> Result<(), Error> {
-        check_size(frame, "GIF", LIMIT as usize)?;
-        self.check([frame.width, frame.height])?;
+    /// Add a frame that a [`Mapper`](super::Mapper) of the same palette and film has mapped.
+    pub fn write(&mut self, frame: Indexed) -> Result<(), Error> {
         if !self.is_kept(self.came) {
-            return self.drop_one();
+            self.came += 1;
+            self.report.dropped += 1;
+            return Ok(());
         }
-        let indexed = self.mapper.map(frame, self.dither);
-        self.add(indexed.indices)
+        let start = self.film.rate.centiseconds(self.came);
+        self.emit(Some(&frame.indices), start)?;
+        self.waiting = Some(Waiting { indices: frame.indices, start });
+        self.came += 1;
+        Ok(())
     }
 
-    /// Add a frame that a [`Mapper`] of the same palette and film has mapped, on another thread perhaps.
-    ///
-    /// # Errors
-    /// [`Error::FrameSize`], [`Error::FrameCount`], [`Error::Encode`].
-    pub fn write_indexed(&mut self, frame: Indexed) -> Result<(), Error> {
-        self.check(frame.size)?;
-        if self.is_kept(self.came) { self.add(frame.indices) } else { self.drop_one() }
-    }
-
-    /// Write what waits and the tail, and hand the stream back.
-    ///
-    /// # Errors
-    /// [`Error::FrameCount`] where frames are missing, [`Error::Encode`].
-    pub fn finish(mut self) -> Result<(W, FilmReport), Error> {
-        if self.came != self.film.frames {
-            return Err(Error::FrameCount { expected: self.film.frames, found: self.came });
-        }
+    /// Write what waits and the tail.
+    pub fn finish(mut self) -> Result<FilmReport, Error> {
         self.emit(None, self.film.rate.centiseconds(self.film.frames))?;
         let mut out = self.encoder.into_inner().map_err(failed)?;
         out.flush().map_err(|source| Error::Encode { format: "GIF", source })?;
-        Ok((out, self.report))
-    }
-
-    fn check(&self, found: [usize; 2]) -> Result<(), Error> {
-        let Film { size, frames, .. } = self.film;
-        if self.came >= frames {
-            return Err(Error::FrameCount { expected: frames, found: self.came + 1 });
-        }
-        if found != size {
-            return Err(Error::FrameSize { frame: self.came + 1, expected: size, found });
-        }
-        Ok(())
+        Ok(self.report)
     }
 
     /// Whether a frame and the one before it are both shown for at least 2 cs.
@@ -119,27 +85,13 @@ impl<W: Write> GifWriter<W> {
         start - before.start >= 2 && rate.centiseconds(self.film.frames) - start >= 2
     }
 
-    fn drop_one(&mut self) -> Result<(), Error> {
-        self.came += 1;
-        self.report.dropped += 1;
-        Ok(())
-    }
-
-    fn add(&mut self, indices: Vec<u8>) -> Result<(), Error> {
-        let start = self.film.rate.centiseconds(self.came);
-        self.emit(Some(&indices), start)?;
-        self.waiting = Some(Waiting { indices, start });
-        self.came += 1;
-        Ok(())
-    }
-
     /// Write the waiting frame, which stays until `end`.
     fn emit(&mut self, next: Option<&[u8]>, end: u64) -> Result<(), Error> {
         let Some(Waiting { indices, start }) = self.waiting.take() else { return Ok(()) };
-        let (hole, width) = (self.mapper.palette().transparent(), self.film.size[0]);
-        let changed = bounds(&self.canvas, &indices, width, |a, b| a != b);
+        let (hole, width) = (self.hole, self.film.size[0]);
+        let changed = bounds(self.canvas.as_chunks::<1>().0, indices.as_chunks::<1>().0, width);
         // Pixels that become holes cannot be drawn: this frame's rectangle covers them and is cleared after it.
-        let cleared = next.and_then(|n| bounds(&indices, n, width, |a, b| *a != hole && *b == hole));
+        let cleared = next.and_then(|n| bounds_where(&indices, n, width, |a, b| *a != hole && *b == hole));
         let rect = match (self.report.frames, changed, cleared) {
             (0, ..) => Rect::full(self.film.size),
             (_, Some(a), Some(b)) => a.union(b),

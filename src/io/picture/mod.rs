@@ -1,13 +1,14 @@
-//! Pictures to files: PNG, numbered sequences, GIF and APNG.
+//! Pictures to files: PNG, WebP and OpenEXR, numbered sequences of them, and films as WebP, APNG, GIF and Y4M.
 //!
-//! Encoding is pure (frame → bytes, on any thread); writing is separate and goes through [`AtomicFile`], so a
-//! half-written picture never carries the name that was asked for.
+//! Encoding is pure (frame → bytes, on any thread: [`encode_png`], [`encode_webp`], [`encode_exr`], [`FrameEncoder`]);
+//! writing is separate ([`FilmWriter`]) and goes through an [`Output`], so a half-written picture never carries the name
+//! that was asked for.
 //!
 //! ```
 //! use sinew::image::Rgba8;
 //! use sinew::io::picture::{PngLevel, Target, encode_png};
 //! let target = Target::parse("walk/out.####.png").unwrap();
-//! assert_eq!(target.path_of(7).to_str(), Some("walk/out.0007.png"));
+//! assert_eq!(target.path_of(7), Some("walk/out.0007.png".into()));
 //! let picture = Rgba8 { width: 2, height: 1, data: vec![255, 0, 0, 255, 0, 0, 255, 255] };
 //! assert_eq!(&encode_png(&picture, PngLevel::Fast).unwrap()[1..4], b"PNG");
 //! ```
@@ -16,23 +17,46 @@ mod apng;
 mod atomic;
 mod delta;
 mod dither;
+mod exr;
+mod exr_read;
 mod film;
+mod format;
 mod gif;
+mod gif_frames;
+mod indexed;
 mod judge;
 mod nearest;
+mod output;
+mod packet;
 mod palette;
+mod palette_file;
+mod pixel_art;
 mod png;
+mod read;
+mod rows;
 mod target;
+mod template;
+mod unnamed;
+mod webp;
+mod y4m;
 
-pub use apng::ApngWriter;
 pub use atomic::{AtomicFile, Folder, cleanup_temporaries};
 pub use dither::{Dither, Indexed, Mapper};
+pub use exr::{ExrDepth, encode_exr};
 pub use film::{Film, FilmReport};
-pub use gif::GifWriter;
+pub use format::{Format, FormatError};
+pub use indexed::{Data, encode_data_png, encode_indexed_png};
 pub use judge::{DitherScore, choose_dither};
+pub use output::Output;
+pub use packet::{Coding, EncodedFrame, FilmWriter, FrameEncoder};
 pub use palette::Palette;
+pub use palette_file::PaletteError;
+pub use pixel_art::{PixelArt, PixelArtDesc};
 pub use png::{PngLevel, encode_png};
-pub use target::{Format, Pattern, Target, TargetError};
+pub use read::{Frame, Frames, Pixels, ReadError, frames_of};
+pub use target::{Pattern, Target, TargetError};
+pub use template::{Fields, Template, TemplateError};
+pub use webp::encode_webp;
 
 use crate::image::Rgba8;
 use std::path::PathBuf;
@@ -52,16 +76,14 @@ pub enum Error {
         height: usize,
         /// Bytes that the buffer holds.
         bytes: usize,
-        /// PNG, GIF or APNG.
+        /// As [`Format::name`] has it.
         format: &'static str,
         /// Longest side that the format allows.
         limit: usize,
     },
     /// A film's frame of another size than the film.
-    #[error("frame {frame} of the film is {}, expected {}: every frame must have the same size", sides(.found), sides(.expected))]
+    #[error("a frame of the film is {}, expected {}: every frame must have the same size", sides(.found), sides(.expected))]
     FrameSize {
-        /// Position in the film, from 1.
-        frame: u32,
         /// Width and height of the film.
         expected: [usize; 2],
         /// Width and height of the frame.
@@ -75,18 +97,41 @@ pub enum Error {
         /// Frames that came.
         found: u32,
     },
-    /// A GIF's frame cannot be shown so long.
+    /// A frame cannot be shown so long.
     #[error(
-        "{rate} frames a second is too slow for GIF, whose longest frame is 655.35 s: expected 0.0016 or more"
+        "{rate} frames a second is too slow for {format}, whose longest frame is {longest}: expected {least} or more"
     )]
     TooSlow {
         /// Frames a second.
         rate: crate::time::Rate,
+        /// GIF or WebP.
+        format: &'static str,
+        /// The longest time.
+        longest: &'static str,
+        /// The least rate.
+        least: &'static str,
+    },
+    /// A frame cannot be shown so briefly.
+    #[error("{rate} frames a second is too fast for {format}: expected at most {most}")]
+    TooFast {
+        /// Frames a second.
+        rate: crate::time::Rate,
+        /// WebP.
+        format: &'static str,
+        /// The highest rate.
+        most: u32,
+    },
+    /// Standard output cannot be written to; [`io::ErrorKind::BrokenPipe`](std::io::ErrorKind::BrokenPipe) where the
+    /// program behind it has closed it.
+    #[error("standard output: {source}")]
+    Stdout {
+        /// The system's reason.
+        source: std::io::Error,
     },
     /// The encoder or the stream behind it failed.
     #[error("{format}: {source}")]
     Encode {
-        /// PNG, GIF or APNG.
+        /// As [`Format::name`] has it.
         format: &'static str,
         /// What failed.
         source: std::io::Error,
@@ -131,9 +176,32 @@ pub enum Error {
     },
 }
 
+impl Error {
+    /// Whether the program that reads standard output went away, which is no fault of anybody's.
+    pub fn is_closed_pipe(&self) -> bool {
+        match self {
+            Self::Stdout { source } | Self::Encode { source, .. } => {
+                source.kind() == std::io::ErrorKind::BrokenPipe
+            }
+            _ => false,
+        }
+    }
+}
+
 /// `640 × 480`.
 fn sides(s: &[usize; 2]) -> String {
     format!("{} × {}", s[0], s[1])
+}
+
+/// Refuse buffers that do not hold `each` bytes for every pixel of a PNG picture.
+fn check_sides([width, height]: [usize; 2], bytes: usize, each: usize) -> Result<(), Error> {
+    let limit = i32::MAX as usize;
+    let fits = |n: usize| (1..=limit).contains(&n);
+    let want = width.checked_mul(height).and_then(|n| n.checked_mul(each));
+    if fits(width) && fits(height) && want == Some(bytes) {
+        return Ok(());
+    }
+    Err(Error::Size { width, height, bytes, format: "PNG", limit })
 }
 
 /// Refuse pictures whose buffer does not match their sides, or whose sides the format cannot say.

@@ -1,17 +1,7 @@
 //! What a file name asks for: a picture, a numbered sequence, or a film.
 
+use super::format::Format;
 use std::path::{Path, PathBuf};
-
-/// The formats that can be written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Format {
-    /// One picture a file.
-    Png,
-    /// A film of at most 255 colours.
-    Gif,
-    /// A film without loss.
-    Apng,
-}
 
 /// A numbered name: `out.####.png` or `out.%04d.png`.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -27,19 +17,21 @@ pub struct Pattern {
 /// Where pictures go.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Target {
-    /// One PNG.
-    Still(PathBuf),
-    /// A PNG a frame.
-    Sequence(Pattern),
-    /// GIF or APNG.
+    /// One picture; a WebP is a film where several frames are written.
+    Still(PathBuf, Format),
+    /// A picture a frame.
+    Sequence(Pattern, Format),
+    /// All frames in one file.
     Film(PathBuf, Format),
+    /// Standard output: `-`.
+    Stdout(Format),
 }
 
 /// Why a name cannot be written to.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TargetError {
     /// No format belongs to the ending.
-    #[error("\"{name}\": expected a name that ends in .png, .gif or .apng, found {found}")]
+    #[error("\"{name}\": expected a name that ends in .png, .webp, .exr, .gif, .apng or .y4m, found {found}")]
     Ending {
         /// The name.
         name: String,
@@ -89,7 +81,7 @@ pub enum TargetError {
     /// Several frames and one name.
     #[error(
         "\"{name}\" names one picture and {frames} frames are to be written; put the frame number into it: \
-         \"{hint}\", or end it in .gif or .apng for a film"
+         \"{hint}\", or end it in .webp, .gif, .apng or .y4m for a film"
     )]
     OneName {
         /// The name.
@@ -99,6 +91,20 @@ pub enum TargetError {
         /// The same name with a number.
         hint: String,
     },
+    /// Several frames on standard output, in a format whose files hold one.
+    #[error(
+        "{frames} frames are to be written to standard output and {format} holds one picture; \
+         expected the format y4m, webp, gif, apng or png (one after the other)"
+    )]
+    OneOutput {
+        /// What was asked for.
+        format: &'static str,
+        /// Frames to be written.
+        frames: usize,
+    },
+    /// Standard output without a format.
+    #[error("\"-\": standard output has no ending; name its format: png, webp, exr, gif, apng or y4m")]
+    Stdout,
     /// A name that is no text, or no name at all.
     #[error("\"{name}\": expected a file name in UTF-8")]
     NoName {
@@ -134,26 +140,32 @@ impl Target {
     /// ```
     /// use sinew::io::picture::{Format, Target};
     /// let t = Target::parse("a/50%%.%03d.png").unwrap();
-    /// assert_eq!(t.path_of(12).to_str(), Some("a/50%.012.png"));
+    /// assert_eq!(t.path_of(12), Some("a/50%.012.png".into()));
     /// assert_eq!(Target::parse("a.gif"), Ok(Target::Film("a.gif".into(), Format::Gif)));
     /// let message = Target::parse("a.jpg").unwrap_err().to_string();
-    /// assert_eq!(message, "\"a.jpg\": expected a name that ends in .png, .gif or .apng, found \".jpg\"");
+    /// assert_eq!(message, "\"a.jpg\": expected a name that ends in .png, .webp, .exr, .gif, .apng or .y4m, found \".jpg\"");
     /// ```
     ///
     /// # Errors
     /// [`TargetError`], with what was expected.
     pub fn parse(path: impl AsRef<Path>) -> Result<Self, TargetError> {
         let path = path.as_ref();
+        if is_stdout(path) {
+            return Err(TargetError::Stdout);
+        }
         let format = format_of(path)?;
         Self::build(path, format)
     }
 
-    /// What a name asks for, the format being given; APNG may end in `.png`.
+    /// What a name asks for, the format being given; APNG may end in `.png`, and `-` is standard output.
     ///
     /// # Errors
     /// [`TargetError`], also where the ending belongs to another format.
     pub fn parse_as(path: impl AsRef<Path>, format: Format) -> Result<Self, TargetError> {
         let path = path.as_ref();
+        if is_stdout(path) {
+            return Ok(Self::Stdout(format));
+        }
         let found = format_of(path)?;
         if found != format && (found, format) != (Format::Png, Format::Apng) {
             let name = path.display().to_string();
@@ -166,52 +178,79 @@ impl Target {
         let name = file_name(path)?;
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         let (around, width) = split(name).map_err(|e| e.error(path))?;
-        match (width, format) {
-            (None, Format::Png) => Ok(Self::Still(folder.join(around.concat()))),
-            (None, _) => Ok(Self::Film(folder.join(around.concat()), format)),
-            (Some(width), Format::Png) => Ok(Self::Sequence(Pattern { folder, around, width })),
-            (Some(_), _) => Err(TargetError::NumberedFilm { name: path.display().to_string() }),
+        match width {
+            None if format.is_still() => Ok(Self::Still(folder.join(around.concat()), format)),
+            None => Ok(Self::Film(folder.join(around.concat()), format)),
+            Some(width) if format.is_still() => Ok(Self::Sequence(Pattern { folder, around, width }, format)),
+            Some(_) => Err(TargetError::NumberedFilm { name: path.display().to_string() }),
         }
     }
 
-    /// The file that a frame goes into.
-    pub fn path_of(&self, frame: i64) -> PathBuf {
+    /// What is written.
+    pub fn format(&self) -> Format {
         match self {
-            Self::Still(path) | Self::Film(path, _) => path.clone(),
-            Self::Sequence(pattern) => pattern.path_of(frame),
+            Self::Still(_, f) | Self::Sequence(_, f) | Self::Film(_, f) | Self::Stdout(f) => *f,
         }
     }
 
-    /// Refuse several frames for a name that holds one picture.
+    /// The name, with `#` where the frame number goes; `-` for standard output.
+    pub fn name(&self) -> PathBuf {
+        match self {
+            Self::Still(path, _) | Self::Film(path, _) => path.clone(),
+            Self::Sequence(Pattern { folder, around: [before, after], width }, _) => {
+                folder.join(format!("{before}{}{after}", "#".repeat(*width)))
+            }
+            Self::Stdout(_) => "-".into(),
+        }
+    }
+
+    /// The file that a frame goes into; none for standard output.
+    pub fn path_of(&self, frame: i64) -> Option<PathBuf> {
+        match self {
+            Self::Still(path, _) | Self::Film(path, _) => Some(path.clone()),
+            Self::Sequence(pattern, _) => Some(pattern.path_of(frame)),
+            Self::Stdout(_) => None,
+        }
+    }
+
+    /// Whether a whole clip goes there unless fewer frames are asked for: into films, sequences and WebP, but not into
+    /// one PNG or EXR.
+    pub fn takes_a_clip(&self) -> bool {
+        matches!(self, Self::Sequence(..)) || self.format().is_film()
+    }
+
+    /// Whether that many frames become one film: several in a WebP, any number in GIF, APNG and Y4M.
+    pub fn is_film(&self, frames: usize) -> bool {
+        match self {
+            Self::Sequence(..) => false,
+            Self::Still(_, f) | Self::Film(_, f) | Self::Stdout(f) => {
+                f.is_film() && (!f.is_still() || frames > 1)
+            }
+        }
+    }
+
+    /// Refuse several frames for what holds one picture.
     ///
     /// # Errors
-    /// [`TargetError::OneName`], with the name that would do.
+    /// [`TargetError::OneName`], with the name that would do; [`TargetError::OneOutput`].
     pub fn check_frames(&self, frames: usize) -> Result<(), TargetError> {
-        let Self::Still(path) = self else { return Ok(()) };
-        if frames <= 1 {
-            return Ok(());
+        match self {
+            Self::Still(path, format) if frames > 1 && !format.is_film() => {
+                let hint = path.with_extension(format!("####.{}", format.ending())).display().to_string();
+                Err(TargetError::OneName { name: path.display().to_string(), frames, hint })
+            }
+            // PNGs one after the other are what `ffmpeg -f image2pipe` reads.
+            Self::Stdout(format) if frames > 1 && !format.is_film() && *format != Format::Png => {
+                Err(TargetError::OneOutput { format: format.name(), frames })
+            }
+            _ => Ok(()),
         }
-        let hint = path.with_extension("####.png").display().to_string();
-        Err(TargetError::OneName { name: path.display().to_string(), frames, hint })
     }
 }
 
-impl Format {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Png => "PNG",
-            Self::Gif => "GIF",
-            Self::Apng => "APNG",
-        }
-    }
-
-    fn endings(self) -> &'static str {
-        match self {
-            Self::Png => ".png",
-            Self::Gif => ".gif",
-            Self::Apng => ".apng or .png",
-        }
-    }
+/// Whether a name stands for standard output.
+fn is_stdout(path: &Path) -> bool {
+    path.as_os_str() == "-"
 }
 
 /// The last component of a path.
@@ -227,15 +266,11 @@ fn file_name(path: &Path) -> Result<&str, TargetError> {
 fn format_of(path: &Path) -> Result<Format, TargetError> {
     file_name(path)?;
     let ending = path.extension().map(|e| e.to_string_lossy().into_owned());
-    match ending.as_deref().map(str::to_ascii_lowercase).as_deref() {
-        Some("png") => Ok(Format::Png),
-        Some("gif") => Ok(Format::Gif),
-        Some("apng") => Ok(Format::Apng),
-        _ => {
-            let found = ending.map_or("no ending".to_owned(), |e| format!("\".{e}\""));
-            Err(TargetError::Ending { name: path.display().to_string(), found })
-        }
-    }
+    let format = ending.as_deref().and_then(|e| e.parse().ok());
+    format.ok_or_else(|| {
+        let found = ending.map_or("no ending".to_owned(), |e| format!("\".{e}\""));
+        TargetError::Ending { name: path.display().to_string(), found }
+    })
 }
 
 /// What is wrong with a pattern, before the name is known.
@@ -301,7 +336,7 @@ mod tests {
     use super::*;
 
     fn name(pattern: &str, frame: i64) -> String {
-        Target::parse(pattern).unwrap().path_of(frame).to_str().unwrap().to_owned()
+        Target::parse(pattern).unwrap().path_of(frame).unwrap().to_str().unwrap().to_owned()
     }
 
     #[test]
@@ -313,7 +348,12 @@ mod tests {
         assert_eq!(name("out####.png", -7), "out-007.png");
         assert_eq!(name("100%%_%02d.png", 3), "100%_03.png");
         assert_eq!(name("50%d/a#b.png", 3), "50%d/a3b.png");
-        assert_eq!(Target::parse("a.png"), Ok(Target::Still("a.png".into())));
+        assert_eq!(Target::parse("a.png"), Ok(Target::Still("a.png".into(), Format::Png)));
+        assert_eq!(Target::parse("a.WebP"), Ok(Target::Still("a.WebP".into(), Format::Webp)));
+        assert_eq!(name("o/out.####.webp", 12), "o/out.0012.webp");
+        assert_eq!(name("o/out.%02d.exr", 1), "o/out.01.exr");
+        assert_eq!(Target::parse("a.y4m"), Ok(Target::Film("a.y4m".into(), Format::Y4m)));
+        assert_eq!(Target::parse_as("-", Format::Y4m), Ok(Target::Stdout(Format::Y4m)));
         assert_eq!(Target::parse("100%%.gif"), Ok(Target::Film("100%.gif".into(), Format::Gif)));
         assert_eq!(Target::parse_as("a.png", Format::Apng), Ok(Target::Film("a.png".into(), Format::Apng)));
     }
@@ -336,17 +376,37 @@ mod tests {
         says("a%.png", "%%");
         says("a%0999999999999999999999d.png", "at most 19");
         says(&format!("{}.png", "#".repeat(20)), "20 digits");
+        says("-", "name its format");
+        says("a.###.y4m", "one file");
         says("a.###.gif", "one file");
         says("a.%d.apng", "one file");
         assert!(Target::parse_as("a.gif", Format::Apng).unwrap_err().to_string().contains(".apng or .png"));
     }
 
     #[test]
-    fn many_frames_need_a_number() {
+    fn many_frames_need_a_number_or_a_film() {
         let still = Target::parse("d/a.png").unwrap();
         assert_eq!(still.check_frames(1), Ok(()));
         assert!(still.check_frames(48).unwrap_err().to_string().contains("d/a.####.png"));
-        assert_eq!(Target::parse("a.#.png").unwrap().check_frames(48), Ok(()));
-        assert_eq!(Target::parse("a.gif").unwrap().check_frames(48), Ok(()));
+        let message = Target::parse("a.exr").unwrap().check_frames(2).unwrap_err().to_string();
+        assert!(message.contains("a.####.exr"), "{message}");
+        for (text, film) in [("a.#.png", false), ("a.#.webp", false), ("a.gif", true), ("a.webp", true)] {
+            let target = Target::parse(text).unwrap();
+            assert_eq!(target.check_frames(48), Ok(()));
+            assert_eq!((target.takes_a_clip(), target.is_film(48)), (true, film), "{text}");
+        }
+        assert!(!Target::parse("a.webp").unwrap().is_film(1) && Target::parse("a.gif").unwrap().is_film(1));
+        assert!(!still.takes_a_clip() && !still.is_film(1));
+    }
+
+    #[test]
+    fn standard_output_takes_films_and_png() {
+        for format in Format::ALL {
+            let target = Target::parse_as("-", format).unwrap();
+            assert_eq!((target.path_of(1), target.check_frames(1)), (None, Ok(())));
+            let many = target.check_frames(3);
+            assert_eq!(many.is_err(), format == Format::Exr, "{format:?}");
+            assert_eq!(target.takes_a_clip(), format.is_film());
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! The rig file as written: field by field what `rigs/README.md` describes, before anything is resolved.
 
-use super::color::Color;
+use super::Color;
 use serde::{Deserialize, Serialize};
 
 /// A whole rig file.

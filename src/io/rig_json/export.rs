@@ -1,6 +1,6 @@
 //! Assets to rig files and files of poses.
 
-use super::color::Color;
+use super::Color;
 use super::document::{self, Bind, Bone, Rig};
 use super::meshes::bone_from_rest;
 use super::poses::{Clip, Interpolation, Poses, Tangents, Track};

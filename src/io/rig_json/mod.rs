@@ -4,7 +4,6 @@
 //! does not have is an error that names it, because hand-written files have typos.
 
 mod bones;
-mod color;
 mod document;
 mod error;
 mod export;
@@ -13,7 +12,7 @@ mod meshes;
 mod poses;
 mod texture;
 
-pub use color::Color;
+pub use super::json_color::Color;
 pub use document::{Bind, Bone, Material, Mesh, Rig, Weights};
 pub use error::RigError;
 pub use export::{Exported, export, export_poses};

@@ -1,17 +1,25 @@
 //! A tile's colours into the picture.
 
+use super::channels::{self, Band};
 use super::colors::{Colors, Sink};
 use super::fill::{NONE, Visibility};
 use super::frame::Frame;
+use super::resolve::Area;
 use super::{IdImage, TILE};
 use crate::image::{Image, Rgba8, color};
 use crate::math::simd::{F8, I8};
+use crate::render::channel::Channels;
 
 /// 64 rows of the output.
 pub(super) enum Target<'a> {
     Rgba8 { width: usize, data: &'a mut [u8] },
     Linear { width: usize, pixels: &'a mut [[f32; 4]] },
     Ids { width: usize, objects: &'a mut [u32], triangles: &'a mut [u32], depth: &'a mut [f32] },
+    Channels(Band<'a>),
+}
+
+pub(super) fn channel_bands(out: &mut Channels) -> Vec<Target<'_>> {
+    channels::bands(out).into_iter().map(Target::Channels).collect()
 }
 
 pub(super) fn rgba8_bands(out: &mut Rgba8) -> Vec<Target<'_>> {
@@ -42,6 +50,7 @@ impl Target<'_> {
             Target::Rgba8 { width, data } => data.len() / (4 * width),
             Target::Linear { width, pixels } => pixels.len() / width,
             Target::Ids { width, objects, .. } => objects.len() / width,
+            Target::Channels(band) => band.rows,
         }
     }
 
@@ -67,7 +76,7 @@ impl Target<'_> {
                     pixels[y * *width + x..][..w].copy_from_slice(&colors.sums[y * TILE..][..w]);
                 }
             }
-            Target::Ids { .. } => {}
+            Target::Ids { .. } | Target::Channels(_) => {}
         }
     }
 
@@ -91,7 +100,7 @@ impl Target<'_> {
                     }
                 }
             }
-            Target::Ids { .. } => {}
+            Target::Ids { .. } | Target::Channels(_) => {}
         }
     }
 
@@ -116,23 +125,28 @@ impl Target<'_> {
                     depth[r].fill(f32::INFINITY);
                 }
             }
+            // They were cleared beforehand.
+            Target::Channels(_) => {}
         }
     }
 
     /// Write what is visible, if that is what the picture is of.
-    pub fn write_ids(&mut self, frame: &Frame, x: usize, w: usize, seen: &Visibility) -> bool {
-        let rows = self.rows();
+    pub fn write_ids(&mut self, frame: &Frame, area: Area, seen: &Visibility) -> bool {
+        if let Target::Channels(band) = self {
+            band.write(frame, area, seen);
+            return true;
+        }
+        let (rows, x, w) = (self.rows(), area.to, area.w);
         let Target::Ids { width, objects, triangles, depth } = self else { return false };
         for (y, i) in (0..rows).flat_map(|y| (0..w).map(move |i| (y, i))) {
             let (from, to) = (y * TILE + i, y * *width + x + i);
-            let block = y / 8 * 8 + i / 8;
-            let id = if seen.touched >> block & 1 != 0 { seen.id[from] } else { NONE };
+            let (id, z) = seen.look(from, 0);
             (objects[to], triangles[to], depth[to]) = (0, 0, f32::INFINITY);
             if id != NONE {
                 let draw = &frame.draws[frame.draw_of(id)];
                 objects[to] = draw.index as u32 + 1;
                 triangles[to] = id - draw.first_triangle;
-                depth[to] = frame.distance(seen.z[from]);
+                depth[to] = frame.distance(z);
             }
         }
         true

@@ -30,6 +30,16 @@ impl Visibility {
         self.id.resize(4 * TILE * TILE, NONE);
     }
 
+    /// Triangle and depth at a sample of a pixel; [`NONE`] where nothing is.
+    pub fn look(&self, place: usize, sample: usize) -> (u32, f32) {
+        let block = place / TILE / 8 * 8 + place % TILE / 8;
+        if self.touched >> block & 1 == 0 {
+            return (NONE, f32::NEG_INFINITY);
+        }
+        let at = place * self.samples + sample;
+        (self.id[at], self.z[at])
+    }
+
     /// Clear the blocks that hold the pixels of a rectangle, ends included, unless they are clear or in use.
     #[inline(always)]
     pub fn touch(&mut self, x: [i32; 2], y: [i32; 2]) {

@@ -18,6 +18,7 @@
 //! the shading equation (5 %).
 
 mod blend;
+mod channels;
 mod clip;
 mod colors;
 mod encode;
@@ -30,8 +31,10 @@ mod setup;
 mod surface;
 mod tile;
 mod vertex;
+mod window;
 
-use super::Settings;
+use super::channel::{Channel, Channels};
+use super::{Settings, Window};
 use crate::image::{Image, Rgba8};
 use crate::math::simd::{self, Isa};
 use crate::scene::Scene;
@@ -39,6 +42,7 @@ use encode::Target;
 use frame::Frame;
 use setup::Bins;
 use tile::TileScratch;
+use window::View;
 
 /// Pixels along a tile's side.
 pub(crate) const TILE: usize = 64;
@@ -81,8 +85,8 @@ pub struct Stats {
     pub shaded: u64,
 }
 
-impl Stats {
-    fn add(&mut self, o: &Self) {
+impl std::ops::AddAssign for Stats {
+    fn add_assign(&mut self, o: Self) {
         self.triangles += o.triangles;
         self.vertices += o.vertices;
         self.skipped += o.skipped;
@@ -111,7 +115,7 @@ impl Stats {
 /// };
 /// let camera = Camera::look_at(Vec3::Z * 3.0, Vec3::ZERO, Vec3::Y, Projection::Orthographic { height: 1.0 });
 /// let scene = Scene {
-///     camera: camera.unwrap(), ambient: Vec3::ONE, lights: vec![], background: [0.0; 4],
+///     camera: camera.unwrap(), ambient: Vec3::ONE, lights: vec![], style: Default::default(), background: [0.0; 4],
 ///     objects: vec![object], materials: &[Material::default()], textures: &[],
 /// };
 /// let mut picture = Rgba8::default();
@@ -124,6 +128,7 @@ impl Stats {
 #[derive(Debug, Default)]
 pub struct Rasterizer {
     isa: Isa,
+    window: Option<Window>,
     vertices: vertex::Vertices,
     bins: Vec<Bins>,
     tiles: Vec<TileScratch>,
@@ -135,14 +140,24 @@ impl Rasterizer {
         Self { isa, ..Self::default() }
     }
 
+    /// Draw this part of pictures alone, or all of them again for `None`: `settings` go on to speak of the whole, outputs take the
+    /// window's size, and its pixels are the whole picture's, bit for bit. What of it lies outside the picture is left out.
+    pub fn set_window(&mut self, window: Option<Window>) {
+        self.window = window;
+    }
+
     /// Draw to 8-bit sRGB with straight alpha; `out` takes the size of `settings`.
     ///
     /// # Panics
     /// If `settings` do not pass [`Settings::check`].
     pub fn draw(&mut self, scene: &Scene, settings: &Settings, out: &mut Rgba8) -> Stats {
-        (out.width, out.height) = (settings.width, settings.height);
-        out.data.resize(4 * settings.width * settings.height, 0);
-        self.paint(scene, settings, encode::rgba8_bands(out))
+        let view = View::new(self.window, settings);
+        (out.width, out.height) = (view.tiles.width, view.tiles.height);
+        out.data.resize(4 * out.width * out.height, 0);
+        let stats = self.paint(scene, settings, view.tiles, encode::rgba8_bands(out));
+        view.cut(4, &mut out.data);
+        [out.width, out.height] = view.size();
+        stats
     }
 
     /// Draw to linear light with premultiplied alpha; `out` takes the size of `settings`.
@@ -150,9 +165,13 @@ impl Rasterizer {
     /// # Panics
     /// If `settings` do not pass [`Settings::check`].
     pub fn draw_linear(&mut self, scene: &Scene, settings: &Settings, out: &mut Image) -> Stats {
-        (out.width, out.height) = (settings.width, settings.height);
-        out.pixels.resize(settings.width * settings.height, [0.0; 4]);
-        self.paint(scene, settings, encode::linear_bands(out))
+        let view = View::new(self.window, settings);
+        (out.width, out.height) = (view.tiles.width, view.tiles.height);
+        out.pixels.resize(out.width * out.height, [0.0; 4]);
+        let stats = self.paint(scene, settings, view.tiles, encode::linear_bands(out));
+        view.cut(1, &mut out.pixels);
+        [out.width, out.height] = view.size();
+        stats
     }
 
     /// Draw what is where, at pixel centres; masks and transparency count as in a picture, but nothing that blends is
@@ -161,16 +180,45 @@ impl Rasterizer {
     /// # Panics
     /// If `settings` do not pass [`Settings::check`].
     pub fn draw_ids(&mut self, scene: &Scene, settings: &Settings, out: &mut IdImage) -> Stats {
-        let n = settings.width * settings.height;
-        (out.width, out.height) = (settings.width, settings.height);
+        let view = View::new(self.window, settings);
+        let n = view.tiles.width * view.tiles.height;
+        (out.width, out.height) = (view.tiles.width, view.tiles.height);
         out.objects.resize(n, 0);
         out.triangles.resize(n, 0);
         out.depth.resize(n, f32::INFINITY);
-        self.paint(scene, &Settings { samples: 1, ..*settings }, encode::id_bands(out))
+        let settings = Settings { samples: 1, ..*settings };
+        let stats = self.paint(scene, &settings, view.tiles, encode::id_bands(out));
+        view.cut(1, &mut out.objects);
+        view.cut(1, &mut out.triangles);
+        view.cut(1, &mut out.depth);
+        [out.width, out.height] = view.size();
+        stats
     }
 
-    /// All stages; `bands` are the rows of tiles of the output.
-    fn paint(&mut self, scene: &Scene, settings: &Settings, bands: Vec<Target>) -> Stats {
+    /// Draw what the pixels show beside their colour: the channels that are asked for, and objects always; nothing that
+    /// blends is in them. `out` takes the size of `settings`.
+    ///
+    /// # Panics
+    /// If `settings` do not pass [`Settings::check`].
+    pub fn draw_channels(
+        &mut self,
+        scene: &Scene,
+        settings: &Settings,
+        wanted: &[Channel],
+        out: &mut Channels,
+    ) -> Stats {
+        let view = View::new(self.window, settings);
+        out.reset(view.tiles.width, view.tiles.height, wanted);
+        let stats = self.paint(scene, settings, view.tiles, encode::channel_bands(out));
+        view.cut(1, &mut out.objects);
+        view.cut(1, &mut out.depth);
+        view.cut(1, &mut out.normals);
+        [out.width, out.height] = view.size();
+        stats
+    }
+
+    /// All stages; `bands` are the rows of tiles of the output, which shows the whole tiles `tiles`.
+    fn paint(&mut self, scene: &Scene, settings: &Settings, tiles: Window, bands: Vec<Target>) -> Stats {
         settings.check().expect("settings are checked by the caller");
         let frame = Frame::new(self.isa, scene, settings);
         let threads = settings.threads.max(1);
@@ -189,18 +237,18 @@ impl Rasterizer {
         // Draw the rows of tiles.
         self.tiles.resize_with(threads.max(self.tiles.len()), TileScratch::default);
         let bins = &self.bins[..threads];
-        let rows = std::sync::Mutex::new(bands.into_iter().enumerate());
+        let rows = std::sync::Mutex::new((tiles.y / TILE..).zip(bands));
         let workers: Vec<&mut TileScratch> = self.tiles[..threads].iter_mut().collect();
         each(workers, threads, |scratch| {
             scratch.stats = Stats::default();
             loop {
                 let next = rows.lock().expect("no worker panics").next();
                 let Some((row, mut target)) = next else { break };
-                simd::run(isa, tile::Row { frame: &frame, bins, row, scratch, target: &mut target });
+                simd::run(isa, tile::Row { frame: &frame, bins, row, tiles, scratch, target: &mut target });
             }
         });
-        bins.iter().for_each(|b| stats.add(&b.stats));
-        self.tiles[..threads].iter().for_each(|t| stats.add(&t.stats));
+        bins.iter().for_each(|b| stats += b.stats);
+        self.tiles[..threads].iter().for_each(|t| stats += t.stats);
         stats
     }
 }

@@ -23,6 +23,8 @@ const BATCHES: usize = 8;
 #[derive(Clone, Copy)]
 pub(super) struct Area {
     pub origin: [i32; 2],
+    /// The output's column that it starts at.
+    pub to: usize,
     pub w: usize,
     pub h: usize,
 }
@@ -103,7 +105,7 @@ pub(super) fn points(corner: [f32; 2], keys: &I8) -> [F8; 2] {
 }
 
 /// Mean position of the samples of a mask, pixels from the centre: it lies within the triangle that covers them.
-static CENTROIDS: [[f32; 2]; 16] = {
+pub(super) static CENTROIDS: [[f32; 2]; 16] = {
     let mut table = [[0.0; 2]; 16];
     let mut mask = 1;
     while mask < 16 {

@@ -47,7 +47,7 @@ pub(super) struct TileBin {
 const SMALL: i32 = 4;
 
 /// The same at four samples a pixel: more samples are better walked by themselves.
-const SMALL_OF_FOUR: i32 = 2;
+const SMALL_OF_FOUR: i32 = 3;
 
 /// Differences up to here multiply within 32 bits.
 const SHORT: i32 = 1 << 14;

@@ -289,6 +289,35 @@ impl<const ONE: bool> Kernel for Shade<'_, ONE> {
     }
 }
 
+/// Eight points whose normals are asked for.
+pub(super) struct Normals<'a> {
+    pub frame: &'a Frame<'a>,
+    pub draw: &'a Draw<'a>,
+    /// Triangles, counted in the draw.
+    pub ids: &'a [u32; 8],
+    /// Where, pixels from the picture's centre.
+    pub px: F8,
+    pub py: F8,
+}
+
+impl Normals<'_> {
+    /// Unit shading normals, scene space.
+    pub fn find(self) -> V8 {
+        simd::run(self.frame.isa, self)
+    }
+}
+
+impl Kernel for Normals<'_> {
+    type Output = V8;
+
+    #[inline(always)]
+    fn run(self) -> V8 {
+        let Self { frame, draw, ids, px, py } = self;
+        let seen = Seen::<false>::new(frame, draw, ids, &[Vec4::ZERO; 3], px, py);
+        material::shading_normal(frame.isa, frame.scene, draw.material, &seen)
+    }
+}
+
 /// Eight points of one triangle to be held against the material's cut-off.
 pub(super) struct Present<'a> {
     pub frame: &'a Frame<'a>,

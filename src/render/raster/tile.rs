@@ -11,6 +11,7 @@ use super::setup::{Bins, Fragment};
 use super::surface::Present;
 use super::{Stats, TILE};
 use crate::math::simd::{I8, Kernel};
+use crate::render::Window;
 
 /// Working memory of one thread.
 #[derive(Debug, Default)]
@@ -30,6 +31,8 @@ pub(super) struct Row<'a, 'b> {
     pub frame: &'a Frame<'a>,
     pub bins: &'a [Bins],
     pub row: usize,
+    /// The part of the picture that the output shows.
+    pub tiles: Window,
     pub scratch: &'a mut TileScratch,
     pub target: &'a mut Target<'b>,
 }
@@ -39,7 +42,8 @@ impl Kernel for Row<'_, '_> {
 
     #[inline(always)]
     fn run(mut self) {
-        for column in 0..self.frame.tiles_x {
+        let tiles = self.tiles;
+        for column in tiles.x / TILE..(tiles.x + tiles.width).div_ceil(TILE) {
             self.tile(column);
         }
     }
@@ -51,16 +55,17 @@ impl Row<'_, '_> {
         let frame = self.frame;
         let index = self.row * frame.tiles_x + column;
         let (x, w) = (column * TILE, TILE.min(frame.width as usize - column * TILE));
+        let to = x - self.tiles.x;
         let empty = |b: &Bins| {
             let t = &b.tiles[index];
             t.fragments.is_empty() && t.solid.is_empty() && t.blend.is_empty()
         };
         if self.bins.iter().all(empty) {
-            return self.target.fill(x, w, frame.scene.background);
+            return self.target.fill(to, w, frame.scene.background);
         }
 
         // What is visible at each sample?
-        let area = Area { origin: [x as i32, (self.row * TILE) as i32], w, h: self.target.rows() };
+        let area = Area { origin: [x as i32, (self.row * TILE) as i32], to, w, h: self.target.rows() };
         self.scratch.seen.start(frame.samples);
         for bins in self.bins {
             for &s in &bins.tiles[index].solid {
@@ -70,7 +75,7 @@ impl Row<'_, '_> {
                 put(&mut self.scratch.seen, f);
             }
         }
-        if self.target.write_ids(frame, x, w, &self.scratch.seen) {
+        if self.target.write_ids(frame, area, &self.scratch.seen) {
             return;
         }
 
@@ -79,12 +84,12 @@ impl Row<'_, '_> {
         if !transparent {
             let sink = self.target.sink();
             resolve::resolve(frame, area, sink, self.scratch);
-            return self.target.write(x, w, &self.scratch.colors);
+            return self.target.write(to, w, &self.scratch.colors);
         }
         resolve::resolve(frame, area, Sink::Layers, self.scratch);
         blend::blend(frame, self.bins, index, area, self.scratch);
         self.scratch.colors.average();
-        self.target.write_planes(x, w, &self.scratch.colors.planes);
+        self.target.write_planes(to, w, &self.scratch.colors.planes);
     }
 
     /// An opaque or masked triangle into the buffer.

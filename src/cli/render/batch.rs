@@ -1,0 +1,327 @@
+//! Many inputs and clips in one run: names, shares, what is there already, what went wrong, what was written.
+
+use super::film::Written;
+use super::stats::{Form, Totals};
+use super::time::Frame;
+use super::{Args, Plan, Task, draw, list, plan};
+use crate::cli::{Failure, load_posed, print, say, say::Say};
+use sinew::io::manifest::{self, Failed, FrameEntry, Manifest, Output};
+use sinew::io::picture::{AtomicFile, Fields, Folder, Target, Template};
+use sinew::io::{Import, Options};
+use sinew::time::Shard;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+#[derive(clap::Args)]
+#[command(next_help_heading = "Batch")]
+pub struct BatchArgs {
+    /// Every clip of every input; the output's name needs {clip}.
+    #[arg(long, conflicts_with_all = ["clip", "rest"])]
+    all_clips: bool,
+    /// Keep the files that are there already and draw the rest.
+    #[arg(long, conflicts_with = "force")]
+    pub skip_existing: bool,
+    /// Say what would be written, and write nothing.
+    #[arg(long)]
+    pub dry_run: bool,
+    /// Write a list of all frames with a hash each, as JSON.
+    #[arg(long, value_name = "FILE")]
+    pub manifest: Option<PathBuf>,
+    /// Draw one share of the work, as in 2/4: every 4th frame from the 2nd, or every 4th film.
+    #[arg(long, value_name = "K/N", default_value = "1/1")]
+    shard: Shard,
+    /// Print what was counted and where the time went.
+    #[arg(long, value_name = "FORM", num_args = 0..=1, require_equals = true, default_missing_value = "text")]
+    pub stats: Option<Form>,
+}
+
+/// A run over all inputs.
+struct Batch<'a> {
+    args: &'a Args,
+    say: &'a Say,
+    template: Template,
+    /// Pieces of work so far, whichever share they belong to.
+    pieces: usize,
+    /// Outputs so far, and where they came from.
+    taken: BTreeMap<PathBuf, String>,
+    manifest: Manifest,
+    failures: Vec<Failure>,
+    tasks: usize,
+    totals: Totals,
+    start: Instant,
+}
+
+/// Draw everything that the arguments ask for.
+pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
+    if args.list {
+        return args.inputs.iter().try_for_each(|input| {
+            let import = load_posed(input, args.time.poses.as_ref(), Options { textures: false }, say)?;
+            list(&import.asset)
+        });
+    }
+    let batch = Batch::new(args, say)?;
+    batch.run()
+}
+
+impl<'a> Batch<'a> {
+    /// Find what is wrong with the arguments before anything is read.
+    fn new(args: &'a Args, say: &'a Say) -> Result<Self, Failure> {
+        let usage = |e: &dyn std::fmt::Display| Failure::Usage(e.to_string());
+        let template = Template::parse(args.output.name()).map_err(|e| usage(&e))?;
+        args.output.target(&template.fill(&Fields { name: "name", folder: "folder", clip: "clip" }))?;
+        args.sheet.settings(args.output.settings()?)?;
+        if args.inputs.len() > 1 && !template.tells_inputs() {
+            let message = "-o: several inputs need {name} (or {folder}) in the output's name";
+            return Err(Failure::Usage(message.into()));
+        }
+        if args.batch.all_clips && !template.tells_clips() {
+            return Err(Failure::Usage("-o: --all-clips needs {clip} in the output's name".into()));
+        }
+        if let Some(path) = args.batch.manifest.as_ref().filter(|p| p.exists()) {
+            if !args.output.force && !args.batch.skip_existing {
+                let message = format!("{}: the file exists; --force overwrites it", path.display());
+                return Err(Failure::Run(message));
+            }
+            keep_inputs(args, path)?;
+        }
+        let (taken, manifest) = (BTreeMap::new(), Manifest::new());
+        let (failures, totals, start) = (vec![], Totals::default(), Instant::now());
+        Ok(Self { args, say, template, pieces: 0, taken, manifest, failures, tasks: 0, totals, start })
+    }
+
+    fn run(mut self) -> Result<(), Failure> {
+        for input in &self.args.inputs {
+            if let Err(failure) = self.input(input) {
+                self.fail(input, failure)?;
+            }
+        }
+        self.write_manifest()?;
+        if let Some(form) = self.args.batch.stats {
+            self.totals.print(form, self.start, self.say);
+        }
+        self.sum_up()
+    }
+
+    /// One failure among many is told and kept; alone it ends the run.
+    fn fail(&mut self, input: &Path, failure: Failure) -> Result<(), Failure> {
+        let many = self.args.inputs.len() > 1 || self.args.batch.all_clips;
+        let fatal = !many && self.args.batch.manifest.is_none();
+        if fatal {
+            return Err(failure);
+        }
+        self.say.error(failure.message());
+        self.manifest.failed.push(Failed { input: input.to_owned(), error: failure.message().to_owned() });
+        self.failures.push(failure);
+        Ok(())
+    }
+
+    fn sum_up(self) -> Result<(), Failure> {
+        let failed = self.failures.len();
+        let Some(worst) = self.failures.into_iter().reduce(Failure::worse) else { return Ok(()) };
+        if self.tasks + failed < 2 {
+            return Err(worst.with_message("nothing was drawn".into()));
+        }
+        Err(worst.with_message(format!(
+            "{failed} of {} outputs failed; the others were written",
+            self.tasks + failed
+        )))
+    }
+
+    fn input(&mut self, input: &Path) -> Result<(), Failure> {
+        if self.skip_unread(input)? {
+            return Ok(());
+        }
+        let textures = !self.args.batch.dry_run;
+        let start = Instant::now();
+        let import = load_posed(input, self.args.time.poses.as_ref(), Options { textures }, self.say)?;
+        self.totals.import += start.elapsed();
+        let clips = import.asset.character.clips();
+        let wanted: Vec<Option<usize>> = match self.args.batch.all_clips {
+            true if clips.is_empty() => vec![None],
+            true => (0..clips.len()).map(Some).collect(),
+            false => vec![self.args.time.clip(&import)?],
+        };
+        for clip in wanted {
+            if let Err(failure) = self.clip(input, &import, clip) {
+                self.fail(input, failure)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a film or a picture is another share's, or there already: then its input need not be read.
+    fn skip_unread(&mut self, input: &Path) -> Result<bool, Failure> {
+        if self.args.batch.all_clips || self.template.tells_clips() {
+            return Ok(false);
+        }
+        let target = self.target(input, "")?;
+        if matches!(target, Target::Sequence(..)) {
+            return Ok(false);
+        }
+        if !self.args.batch.shard.has(self.pieces) {
+            self.pieces += 1;
+            return Ok(true);
+        }
+        let path = target.path_of(1).filter(|p| self.args.batch.skip_existing && p.exists());
+        if let Some(path) = path
+            && self.args.batch.manifest.is_none()
+            && !self.args.batch.dry_run
+        {
+            self.pieces += 1;
+            self.say.note(&format!("kept {}", path.display()));
+            return Ok(true);
+        }
+        Ok(false)
+    }
+
+    fn target(&self, input: &Path, clip: &str) -> Result<Target, Failure> {
+        let lossy = |s: Option<&std::ffi::OsStr>| s.unwrap_or_default().to_string_lossy().into_owned();
+        let name = lossy(input.file_stem());
+        let folder = lossy(input.parent().and_then(|p| p.file_name()));
+        self.args.output.target(&self.template.fill(&Fields { name: &name, folder: &folder, clip }))
+    }
+
+    fn clip(&mut self, input: &Path, import: &Import, clip: Option<usize>) -> Result<(), Failure> {
+        let clip_name = clip.map(|c| import.asset.character.clips()[c].name.clone());
+        let target = self.target(input, clip_name.as_deref().unwrap_or("rest"))?;
+        self.claim(input, &clip_name, &target)?;
+        target.path_of(1).map_or(Ok(()), |path| keep_inputs(self.args, &path))?;
+        self.args.sheet.companions(&target).iter().try_for_each(|p| keep_inputs(self.args, p))?;
+        let task = Task { input, import, clip, target: &target };
+        let mut plan = plan(self.args, &task)?;
+        self.take_share(&target, &mut plan.frames);
+        if plan.frames.is_empty() {
+            return Ok(());
+        }
+        let all = plan.frames.clone();
+        let skip = self.args.batch.skip_existing;
+        let there = |f: &Frame| skip && target.path_of(f.number).is_some_and(|p| p.exists());
+        plan.frames.retain(|f| !there(f));
+        if self.args.batch.dry_run {
+            return announce(&task, &plan, all.len());
+        }
+        let done = match plan.frames.is_empty() {
+            true => Written::default(),
+            false => draw(self.args, &task, &plan, &mut self.totals, self.say)?,
+        };
+        if plan.frames.len() < all.len() {
+            let kept = all.len() - plan.frames.len();
+            self.say.note(&format!("kept {kept} frames of {} that were there", target.name().display()));
+        }
+        self.tasks += 1;
+        match self.args.batch.manifest {
+            Some(_) => self.record(&task, clip_name, &all, &plan, done),
+            None => Ok(()),
+        }
+    }
+
+    /// Leave the frames of this share; a file of many frames is one piece of work.
+    fn take_share(&mut self, target: &Target, frames: &mut Vec<Frame>) {
+        let (shard, first) = (self.args.batch.shard, self.pieces);
+        if matches!(target, Target::Sequence(..)) {
+            self.pieces += frames.len();
+            let mut piece = first..;
+            frames.retain(|_| piece.next().is_some_and(|i| shard.has(i)));
+        } else {
+            self.pieces += 1;
+            if !shard.has(first) {
+                frames.clear();
+            }
+        }
+    }
+
+    /// Refuse a name that another output of this run has.
+    fn claim(&mut self, input: &Path, clip: &Option<String>, target: &Target) -> Result<(), Failure> {
+        let source = match clip {
+            Some(clip) => format!("clip {clip} of {}", input.display()),
+            None => input.display().to_string(),
+        };
+        let path = target.path_of(1).unwrap_or("-".into());
+        match self.taken.get(&path) {
+            Some(other) => Err(Failure::Usage(format!(
+                "{}: {other} and {source} would be written there; tell them apart by {{folder}}, {{name}} or {{clip}}",
+                path.display()
+            ))),
+            None => {
+                self.taken.insert(path, source);
+                Ok(())
+            }
+        }
+    }
+
+    /// List what was drawn and what was there already.
+    fn record(
+        &mut self,
+        task: &Task,
+        clip: Option<String>,
+        all: &[Frame],
+        plan: &Plan,
+        done: Written,
+    ) -> Result<(), Failure> {
+        let hash = |path: &Path| {
+            manifest::sha256_of_file(path).map_err(|e| Failure::Run(format!("{}: {e}", path.display())))
+        };
+        let single = !task.target.is_film(all.len());
+        let mut drawn: BTreeMap<i64, String> =
+            plan.frames.iter().map(|f| f.number).zip(done.hashes).collect();
+        let mut frames = vec![];
+        for f in all {
+            let file = task.target.path_of(f.number).filter(|_| single);
+            let sha256 = match (drawn.remove(&f.number), &file) {
+                (None, Some(file)) => Some(hash(file)?),
+                (drawn, _) => drawn,
+            };
+            frames.push(FrameEntry { frame: f.number, seconds: f.moment.time, file, sha256 });
+        }
+        let film = task.target.path_of(1).filter(|_| !single);
+        self.manifest.outputs.push(Output {
+            input: task.input.to_owned(),
+            input_sha256: hash(task.input)?,
+            clip,
+            output: task.target.name(),
+            size: plan.size,
+            fps: self.args.time.fps.to_string(),
+            sha256: film.as_deref().map(hash).transpose()?,
+            file: film,
+            frames,
+        });
+        Ok(())
+    }
+
+    fn write_manifest(&mut self) -> Result<(), Failure> {
+        let Some(path) = self.args.batch.manifest.as_ref().filter(|_| !self.args.batch.dry_run) else {
+            return Ok(());
+        };
+        self.manifest.sort();
+        let json = self.manifest.to_json();
+        AtomicFile::write(path, json.as_bytes(), true, Folder::MustExist)
+            .map_err(|e| Failure::Run(e.to_string()))
+    }
+}
+
+/// Say what would be written.
+fn announce(task: &Task, plan: &Plan, all: usize) -> Result<(), Failure> {
+    let [w, h] = plan.size;
+    let clip = task.clip.map_or("rest", |c| task.import.asset.character.clips()[c].name.as_str());
+    let n = plan.frames.len();
+    let line = format!(
+        "{}: {n} of {all} frames of {w}x{h}, {} of {}\n",
+        task.target.name().display(),
+        say::name(clip),
+        task.input.display()
+    );
+    print(line.as_bytes())
+}
+
+/// Refuse to write over what is being read, `--force` or not.
+fn keep_inputs(args: &Args, path: &Path) -> Result<(), Failure> {
+    let Ok(output) = path.canonicalize() else { return Ok(()) };
+    for input in args.inputs.iter().chain(&args.time.poses) {
+        if input.canonicalize().is_ok_and(|i| i == output) {
+            let message = format!("-o {}: this is an input; choose another name", input.display());
+            return Err(Failure::Usage(message));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,286 @@
+//! Frames into files: drawn and encoded by workers, written in order.
+
+use super::sheet::Painter;
+use super::time::Frame;
+use crate::cli::{Failure, say::Say};
+use sinew::frames::{FrameStats, Moment, Shot, Stop, Worker, in_order_pairs};
+use sinew::image::{Image, Rgba8};
+use sinew::io::manifest::sha256;
+use sinew::io::picture::{
+    self, AtomicFile, Coding, Dither, ExrDepth, Film, FilmWriter, Folder, Format, FrameEncoder, Output,
+    Palette, PngLevel, Target, choose_dither, encode_exr, encode_png, encode_webp,
+};
+use sinew::time::Rate;
+use std::io::Write;
+use std::time::{Duration, Instant};
+
+/// Frames that a palette is made from.
+const PALETTE_FRAMES: usize = 16;
+
+/// What is to be written.
+pub struct Job<'a> {
+    pub shot: &'a Shot<'a>,
+    pub frames: &'a [Frame],
+    pub rate: Rate,
+    pub transparent: bool,
+    pub target: &'a Target,
+    pub level: PngLevel,
+    pub threads: usize,
+    pub force: bool,
+    /// Compute hashes.
+    pub hash: bool,
+    /// Frames become pixel art; they are drawn before nothing then.
+    pub art: Option<Painter>,
+    /// Pixels of a finished frame for each one that is drawn, across and down.
+    pub scale: usize,
+}
+
+impl Job<'_> {
+    /// Pixels of a finished frame.
+    pub fn size(&self) -> [usize; 2] {
+        self.shot.size().map(|side| side * self.scale)
+    }
+}
+
+/// What was written, and what it cost.
+#[derive(Default)]
+pub struct Written {
+    /// A hash a frame, if they were asked for: of its file or, in a film, of its pixels.
+    pub hashes: Vec<String>,
+    /// Sums over all frames.
+    pub drawn: FrameStats,
+    /// Bytes of pictures, as they left the encoder.
+    pub bytes: u64,
+    /// Time of encoding, all threads together.
+    pub encode: Duration,
+    /// Time of writing.
+    pub write: Duration,
+}
+
+pub fn write(job: &Job, say: &Say) -> Result<Written, Failure> {
+    refuse_existing(job)?;
+    let film = job.target.is_film(job.frames.len());
+    let drawn = match job.target.format() {
+        _ if film => write_film(job, say),
+        Format::Exr if job.art.is_some() => {
+            let message = "--pixel-art: OpenEXR has no palette; expected a name that ends in .png, .webp, .gif or .apng";
+            return Err(Failure::Usage(message.into()));
+        }
+        Format::Exr => stills(job, say, shoot_linear, |p| encode_exr(p, ExrDepth::Float)),
+        Format::Webp => stills(job, say, shoot, encode_webp),
+        _ => match &job.art {
+            Some(art) => stills(job, say, shoot, |p| art.encode_png(p, job.level)),
+            None => stills(job, say, shoot, |p| encode_png(p, job.level)),
+        },
+    };
+    let written = match drawn {
+        // A reader that has seen enough (`| head`) is no failure.
+        Err(Fault::Write(e)) if e.is_closed_pipe() => return Ok(Written::default()),
+        Err(Fault::Write(e)) => return Err(Failure::Run(e.to_string())),
+        Err(Fault::Stopped) => return Err(Failure::Run("drawing stopped".into())),
+        Ok(written) => written,
+    };
+    let n = job.frames.len();
+    say.note(&match [0, n - 1].map(|i| job.target.path_of(job.frames[i].number)) {
+        [None, _] => return Ok(written),
+        [Some(first), Some(last)] if first != last => {
+            format!("wrote {n} frames, {} … {}", first.display(), last.display())
+        }
+        [Some(path), _] => format!("wrote {}", path.display()),
+    });
+    Ok(written)
+}
+
+/// Why frames were not written.
+enum Fault {
+    Write(picture::Error),
+    Stopped,
+}
+
+impl From<picture::Error> for Fault {
+    fn from(e: picture::Error) -> Self {
+        Self::Write(e)
+    }
+}
+
+/// Say so before anything is drawn.
+fn refuse_existing(job: &Job) -> Result<(), Failure> {
+    if job.force {
+        return Ok(());
+    }
+    for frame in job.frames {
+        let Some(path) = job.target.path_of(frame.number) else { continue };
+        if path.exists() {
+            let message = format!("{}: the file exists; --force overwrites it", path.display());
+            return Err(Failure::Run(message));
+        }
+    }
+    Ok(())
+}
+
+/// Draws one moment.
+type Shoot<P> = fn(&Job, Moment, &mut Worker) -> (P, FrameStats);
+
+/// As it is shown: painted, where there is pixel art.
+fn shoot(job: &Job, moment: Moment, worker: &mut Worker) -> (Rgba8, FrameStats) {
+    let mut out = Rgba8::default();
+    let stats = job.shot.draw(moment, worker, &mut out);
+    match &job.art {
+        Some(art) => (art.paint(&out), stats),
+        None => (out, stats),
+    }
+}
+
+fn shoot_linear(job: &Job, moment: Moment, worker: &mut Worker) -> (Image, FrameStats) {
+    let mut out = Image::default();
+    let stats = job.shot.draw_linear(moment, worker, &mut out);
+    (out, stats)
+}
+
+/// Draw moments in parallel, encode each beside the one before on a worker, and hand the results on in order.
+fn draw<P: Send + Sync, S, T: Send>(
+    job: &Job,
+    frames: &[Frame],
+    shoot: Shoot<P>,
+    state: impl Fn() -> S + Sync,
+    encode: impl Fn(&mut S, Option<&P>, &P) -> T + Sync,
+    mut receive: impl FnMut(&mut Written, usize, T) -> Result<(), picture::Error>,
+) -> Result<Written, Fault> {
+    let mut fault = None;
+    let mut written = Written::default();
+    let start = || (Worker::default(), state());
+    let first = |(worker, _): &mut (Worker, S), i: usize| shoot(job, frames[i].moment, worker);
+    let second = |(_, s): &mut (Worker, S), before: Option<&(P, FrameStats)>, now: &(P, FrameStats)| {
+        let start = Instant::now();
+        let encoded = encode(s, before.map(|b| &b.0), &now.0);
+        (encoded, now.1, start.elapsed())
+    };
+    let done =
+        in_order_pairs(frames.len(), job.threads, start, first, second, |i, (result, stats, encode)| {
+            let start = Instant::now();
+            written.drawn += stats;
+            written.encode += encode;
+            let done = receive(&mut written, i, result);
+            written.write += start.elapsed();
+            done.map_err(|e| {
+                fault = Some(e);
+                Stop
+            })
+        });
+    match (done, fault) {
+        (Ok(()), _) => Ok(written),
+        (_, Some(e)) => Err(Fault::Write(e)),
+        (Err(Stop), None) => Err(Fault::Stopped),
+    }
+}
+
+/// A picture a frame, each into a file of its own or one after the other to standard output.
+fn stills<P: Send + Sync>(
+    job: &Job,
+    say: &Say,
+    shoot: Shoot<P>,
+    encode: impl Fn(&P) -> Result<Vec<u8>, picture::Error> + Sync,
+) -> Result<Written, Fault> {
+    let folder = if matches!(job.target, Target::Sequence(..)) { Folder::Create } else { Folder::MustExist };
+    let bar = say.progress(job.frames.len());
+    let encode = |(): &mut (), _: Option<&P>, picture: &P| {
+        encode(picture).map(|bytes| (job.hash.then(|| sha256(&bytes)), bytes))
+    };
+    let written = draw(
+        job,
+        job.frames,
+        shoot,
+        || (),
+        encode,
+        |written, i, result| {
+            let (hash, bytes) = result?;
+            written.hashes.extend(hash);
+            written.bytes += bytes.len() as u64;
+            match job.target.path_of(job.frames[i].number) {
+                Some(path) => AtomicFile::write(path, &bytes, job.force, folder)?,
+                None => {
+                    let mut out = Output::stdout(false);
+                    out.write_all(&bytes).map_err(|source| picture::Error::Stdout { source })?;
+                    out.commit()?;
+                }
+            }
+            bar.inc(1);
+            Ok(())
+        },
+    );
+    bar.finish_and_clear();
+    written
+}
+
+/// All frames into one file.
+fn write_film(job: &Job, say: &Say) -> Result<Written, Fault> {
+    let film =
+        Film { transparent: job.transparent, ..Film::new(job.size(), job.frames.len() as u32, job.rate) };
+    let format = job.target.format();
+    // WebP goes back to its head, which a pipe cannot.
+    let mut out = match job.target.path_of(0) {
+        Some(path) => Output::file(path, job.force, Folder::MustExist)?,
+        None => Output::stdout(format == Format::Webp),
+    };
+    let coding = match format {
+        Format::Gif => match &job.art {
+            Some(art) => Coding::Gif(art.palette().clone(), Dither::None),
+            None => gif_coding(job, &film, say)?,
+        },
+        Format::Webp => Coding::Webp,
+        Format::Y4m => Coding::Y4m,
+        _ => Coding::Apng(job.level),
+    };
+    let mut writer = FilmWriter::new(&mut out, film, &coding)?;
+    let bar = say.progress(job.frames.len());
+    let encode = |encoder: &mut FrameEncoder, before: Option<&Rgba8>, now: &Rgba8| {
+        let hash = job.hash.then(|| sha256(&now.data));
+        encoder.encode(before, now).map(|frame| (hash, frame))
+    };
+    let state = || FrameEncoder::new(film, &coding);
+    let mut written = draw(job, job.frames, shoot, state, encode, |written, _, result| {
+        let (hash, frame) = result?;
+        written.hashes.extend(hash);
+        bar.inc(1);
+        writer.write(frame)
+    })?;
+    bar.finish_and_clear();
+    let report = writer.finish()?;
+    if report.dropped > 0 {
+        let dropped = report.dropped;
+        say.note(&format!(
+            "{dropped} frames were too short for GIF; the film's length is right without them"
+        ));
+    }
+    written.bytes = std::io::Seek::stream_position(&mut out).unwrap_or(0);
+    out.commit()?;
+    Ok(written)
+}
+
+/// The palette and the dithering of a GIF: a few frames, spread over the film, decide.
+fn gif_coding(job: &Job, film: &Film, say: &Say) -> Result<Coding, Fault> {
+    let n = job.frames.len();
+    let few = n.min(PALETTE_FRAMES);
+    let spread: Vec<Frame> = (0..few).map(|k| job.frames[k * n / few]).collect();
+    let mut samples = Vec::with_capacity(few);
+    let keep = |(): &mut (), _: Option<&Rgba8>, picture: &Rgba8| picture.clone();
+    draw(
+        job,
+        &spread,
+        shoot,
+        || (),
+        keep,
+        |_, _, picture| {
+            samples.push(picture);
+            Ok(())
+        },
+    )?;
+    let palette = Palette::from_frames(&samples, 256, film);
+    let (dither, scores) = choose_dither(&samples, &palette, film);
+    for s in scores {
+        let chosen = if s.dither == dither { ", chosen" } else { "" };
+        let name = s.dither.name();
+        say.detail(&format!("dithering {name}: error {:.3}, flicker {:.3}{chosen}", s.error, s.flicker));
+    }
+    Ok(Coding::Gif(palette, dither))
+}

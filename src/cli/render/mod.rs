@@ -1,0 +1,182 @@
+//! `sinew render`: what is to be drawn, from where, and into which files. One file a group of options.
+
+mod batch;
+mod bone;
+mod camera;
+mod film;
+mod look;
+mod output;
+mod overlay;
+mod sheet;
+mod stats;
+mod time;
+
+use super::{Failure, print, say, say::Say};
+use film::{Job, Written};
+use sinew::asset::Asset;
+use sinew::frames::{Shot, ShotDesc};
+use sinew::io::Import;
+use sinew::io::picture::Target;
+use sinew::render::Settings;
+use sinew::time::Range;
+use stats::Totals;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use time::Frame;
+
+const EXAMPLES: &str = "\
+Examples:
+  sinew render rigs/pip.json -o walk.gif
+  sinew render fox.glb -o fox.png --at 0.5 --size 1024
+  sinew render fox.glb -o run.####.png --clip Run --fps 30 --background transparent
+  sinew render fox.glb -o part.%04d.png --frames 1-48x2,60
+  sinew render fox.glb -o side.apng --camera yaw=90,pitch=5,fov=20
+  sinew render rigs/pip.json -o pip-sheet.png --sheet trimmed --directions 8 --camera pitch=30,yaw=0,ortho --size 128 --fps 12
+  sinew render fox.glb -o fox-sheet.png --sheet grid --maps normal,depth,id --sheet-json aseprite --size 128
+  sinew render fox.glb -o fox.gif --pixel-art --pixel-scale 4 --size 256 --colors 16 --outline
+  sinew render fox.glb -o fox-contact.png --contact 6x4 --size 160
+  sinew render fox.glb -o icon.png --camera isometric --background transparent
+  sinew render rigs/fox.json -o round.gif --turntable
+  sinew render *.glb --all-clips -o thumbs/{name}-{clip}.gif
+  sinew render fox.glb -o farm.####.png --shard 2/4 --manifest part2.json
+  sinew render fox.glb --list
+
+Frames are numbered from 1; frame 1 shows 0 s, or the clip's first key if that is earlier. The camera orbits the character and stands where all of it is
+seen over the whole clip, unless --camera names one of the asset's. An existing file is kept unless --force is given.";
+
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// glTF files (.gltf, .glb) or rigs (.json).
+    #[arg(required = true, value_name = "INPUT")]
+    inputs: Vec<PathBuf>,
+    /// Show the clips and cameras of the input and stop.
+    #[arg(long)]
+    list: bool,
+    #[command(flatten)]
+    output: output::OutputArgs,
+    #[command(flatten)]
+    time: time::TimeArgs,
+    #[command(flatten)]
+    camera: camera::CameraArgs,
+    #[command(flatten)]
+    look: look::LookArgs,
+    #[command(flatten)]
+    overlay: overlay::OverlayArgs,
+    #[command(flatten)]
+    sheet: sheet::SheetArgs,
+    #[command(flatten)]
+    batch: batch::BatchArgs,
+}
+
+pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
+    // A temporary must not outlive Ctrl-C or a request to terminate; the handler runs on a thread of its own.
+    let _ = ctrlc::set_handler(|| {
+        sinew::io::picture::cleanup_temporaries();
+        std::process::exit(130);
+    });
+    batch::run(args, say)
+}
+
+/// One output: an asset, one of its clips or rest, and where the pictures go.
+struct Task<'a> {
+    input: &'a Path,
+    import: &'a Import,
+    clip: Option<usize>,
+    target: &'a Target,
+}
+
+/// Which pictures an output consists of.
+struct Plan {
+    frames: Vec<Frame>,
+    size: [usize; 2],
+}
+
+fn plan(args: &Args, task: &Task) -> Result<Plan, Failure> {
+    let clips = task.import.asset.character.clips();
+    let range = task.clip.map_or(Range::default(), |c| clips[c].playback());
+    let one_picture = args.sheet.is_one_picture();
+    let alone = !task.target.takes_a_clip() && !one_picture;
+    let frames = args.time.frames(task.input, range, alone, args.camera.turntable)?;
+    if !one_picture {
+        task.target.check_frames(frames.len()).map_err(|e| Failure::Usage(e.to_string()))?;
+    }
+    let settings = args.output.settings()?;
+    let whole = [settings.width, settings.height];
+    Ok(Plan { frames, size: args.camera.crop(whole)?.map_or(whole, |c| [c.width, c.height]) })
+}
+
+/// Draw the frames of a plan and write them.
+fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -> Result<Written, Failure> {
+    let asset = &task.import.asset;
+    let character = &asset.character;
+    if character.instances().iter().all(|i| character.mesh(i).triangles.is_empty()) {
+        say.warn(&format!("{}: there are no triangles; the picture will be empty", task.input.display()));
+    }
+
+    let range = task.clip.map_or(Range::default(), |c| character.clips()[c].playback());
+    if let Some(note) = args.camera.turntable.and_then(|lap| args.time.seam(range, lap)) {
+        say.note(&note);
+    }
+
+    // One picture is drawn by all threads, many by one thread each.
+    let threads = args.output.threads();
+    let one_picture = args.sheet.is_one_picture();
+    let alone = plan.frames.len() == 1 && !one_picture;
+    let settings = args.sheet.settings(args.output.settings()?)?;
+    let settings = Settings { threads: if alone { threads } else { 1 }, ..settings };
+    let desc = ShotDesc {
+        clip: task.clip,
+        wrap: args.time.wrap(args.camera.turntable),
+        view: args.sheet.view(args.camera.view(asset)?, args.camera.is_default()),
+        framing: args.camera.framing(asset)?,
+        look: args.look.look(asset, |m| say.warn(m))?,
+        overlays: args.overlay.overlays(asset, args.time.fps)?,
+        crop: args.camera.crop([settings.width, settings.height])?,
+        settings,
+    };
+    let background = if args.sheet.is_transparent() { [0.0; 4] } else { desc.look.background };
+    let transparent = look::transparent(&desc.look) || args.sheet.is_transparent();
+    let start = Instant::now();
+    let desc = args.sheet.desc(desc, asset);
+    let shot = Shot::new(asset, desc).map_err(|e| Failure::Usage(e.to_string()))?;
+    totals.framing += start.elapsed();
+    let moments = args.sheet.contact_frames(&shot);
+    let mut job = Job {
+        shot: &shot,
+        frames: moments.as_ref().unwrap_or(&plan.frames),
+        rate: args.time.fps,
+        transparent,
+        target: task.target,
+        level: args.output.png,
+        threads,
+        force: args.output.force,
+        hash: args.batch.manifest.is_some(),
+        art: None,
+        scale: args.sheet.pixels.scale(),
+    };
+    job.art = args.sheet.pixels.art(&job, background, say)?;
+    let written = if one_picture {
+        let name = task.clip.map_or("rest", |c| character.clips()[c].name.as_str());
+        args.sheet.write(&job, name, say)?;
+        Written::default()
+    } else {
+        film::write(&job, say)?
+    };
+    totals.add(&written, job.frames.len());
+    Ok(written)
+}
+
+fn list(asset: &Asset) -> Result<(), Failure> {
+    let mut text = String::new();
+    for (i, c) in asset.character.clips().iter().enumerate() {
+        text += &format!("clip {i}: {} ({:.3} s)\n", say::name(&c.name), c.playback().duration());
+    }
+    for (i, c) in asset.cameras.iter().enumerate() {
+        text += &format!("camera {i}: {}\n", say::name(&c.name));
+    }
+    if text.is_empty() {
+        text = "no clips and no cameras\n".into();
+    }
+    print(text.as_bytes())
+}

@@ -1,0 +1,66 @@
+//! Which points a framing must hold: all vertices, over the whole clip.
+
+use super::framing::Framing;
+use super::worker::Worker;
+use crate::asset::Asset;
+use crate::skeleton::BoneId;
+use crate::time::Range;
+use glam::{DVec3, Vec3};
+
+/// A clip of an asset, seen from the scene's origin.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Span<'a> {
+    pub asset: &'a Asset,
+    /// The rest pose for `None`.
+    pub clip: Option<usize>,
+    /// The world point that the scene has its origin at.
+    pub center: DVec3,
+}
+
+impl Span<'_> {
+    /// Seconds that the clip plays.
+    pub fn range(&self) -> Range {
+        self.clip.map(|c| self.asset.character.clips()[c].playback()).unwrap_or_default()
+    }
+}
+
+/// Show `see` the vertices of every mesh at moments of the whole clip, as seen by a camera that follows `anchor`: a bone,
+/// and where it stands in the world when the camera does not move.
+///
+/// Where there is no triangle, the bones' ends stand for the meshes.
+pub(super) fn each_moment(
+    span: &Span,
+    anchor: Option<(BoneId, DVec3)>,
+    worker: &mut Worker,
+    mut see: impl FnMut(&[Vec3]),
+) {
+    let character = &span.asset.character;
+    let solid = |i: usize| !character.mesh(&character.instances()[i]).triangles.is_empty();
+    let instances: Vec<usize> = (0..character.instances().len()).filter(|&i| solid(i)).collect();
+
+    // A moment each 24th of a second, both ends included; long clips of large meshes are looked at more thinly.
+    let vertices: usize = character.instances().iter().map(|i| character.mesh(i).positions.len()).sum();
+    let most = (Framing::VERTICES / vertices.max(1)).clamp(Framing::FEWEST, Framing::MOST);
+    let range = span.range();
+    let moments = (range.duration() * 24.0).clamp(0.0, (most - 1) as f64).ceil() as usize + 1;
+    let mut points = Vec::new();
+    for k in 0..moments {
+        let t = range.start + range.duration() * k as f64 / (moments - 1).max(1) as f64;
+        worker.evaluate(span.asset, span.clip, t);
+        let Worker { pose, posed, scratch, .. } = &mut *worker;
+        let center = span.center + anchor.map_or(DVec3::ZERO, |(bone, at)| posed.origin(bone) - at);
+        for &i in &instances {
+            character.positions(i, pose, posed, center, scratch, &mut points);
+            see(&points);
+        }
+        if instances.is_empty() {
+            let skeleton = character.skeleton();
+            points.clear();
+            for bone in skeleton.ids() {
+                let m = posed.near(bone, center);
+                points.extend([m.translation.into(), m.transform_point3(skeleton.tip(bone))]);
+            }
+            see(&points);
+        }
+    }
+}

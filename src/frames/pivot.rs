@@ -1,0 +1,89 @@
+//! Where the character stands in its pictures, and whether its clip comes back to where it began.
+
+use super::fit::{self, Span};
+use super::{Moment, Shot, Worker};
+use crate::asset::Asset;
+use crate::render::raster::Stats;
+use crate::scene::Camera;
+use crate::time;
+use glam::{DAffine3, DVec3, Vec3};
+
+/// Relative to the character's size, and to one for directions: what the eye takes for the same pose.
+const SAME: f64 = 2e-3;
+
+/// The point of the world where the character stands: what a game puts on its ground.
+///
+/// It is as high as the lowest vertex of the clip (of the rest pose for `None`), and lies below the world's origin if that is within the
+/// character's bounds over the clip or up to a tenth of their size beside them; else below their middle.
+///
+/// # Panics
+/// If the asset has no such clip.
+pub fn ground_point(asset: &Asset, clip: Option<usize>) -> DVec3 {
+    let mut worker = Worker::default();
+    worker.evaluate(asset, clip, clip.map_or(0.0, |c| asset.character.clips()[c].playback().start));
+    let center = asset.character.center(&worker.posed);
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    fit::each_moment(&Span { asset, clip, center }, None, &mut worker, |points| {
+        for p in points.iter().filter(|p| p.is_finite()) {
+            (low, high) = (low.min(*p), high.max(*p));
+        }
+    });
+    if !low.is_finite() {
+        return DVec3::ZERO;
+    }
+    let (low, high) = (low.as_dvec3() + center, high.as_dvec3() + center);
+    let beside = (high - low).max_element() * 0.1;
+    let near = |low: f64, high: f64| (low - beside..=high + beside).contains(&0.0);
+    let stands = near(low.x, high.x) && near(low.z, high.z);
+    let below = if stands { DVec3::ZERO } else { (low + high) * 0.5 };
+    DVec3::new(below.x, low.y, below.z)
+}
+
+impl Shot<'_> {
+    /// Where a point of the world is in the picture of a moment: fractions of its width and height from the top left, possibly
+    /// outside. `None` behind the eye.
+    pub fn project(&self, moment: impl Into<Moment>, point: DVec3, worker: &mut Worker) -> Option<[f64; 2]> {
+        let mut camera: Option<Camera> = None;
+        self.with_scene(moment.into(), worker, |scene, _| {
+            camera = Some(scene.camera);
+            Stats::default()
+        });
+        let settings = &self.desc.settings;
+        let aspect = settings.width as f32 / settings.height.max(1) as f32;
+        let p = camera?.clip_from_scene(aspect).as_dmat4() * (point - self.center).extend(1.0);
+        (p.w > 0.0).then(|| [0.5 + 0.5 * p.x / p.w, 0.5 - 0.5 * p.y / p.w])
+    }
+
+    /// Whether the clip's end looks like its start, so that it may be shown again and again.
+    ///
+    /// Bones may differ by two thousandths of the character's size, and of one in direction. The rest pose does not move, and is no loop.
+    pub fn loops(&self, worker: &mut Worker) -> bool {
+        let Some(clip) = self.desc.clip else { return false };
+        if self.desc.wrap == time::Wrap::Loop {
+            return true;
+        }
+        let mut at = |t: f64| {
+            worker.evaluate(self.asset, Some(clip), t);
+            let bones = self.asset.character.skeleton().ids();
+            (bones.map(|b| worker.posed.world_from_bone(b)).collect::<Vec<_>>(), worker.pose.weights.clone())
+        };
+        let (start, end) = (at(self.range.start), at(self.range.end));
+        let size = extent(&start.0);
+        let still = start.1.iter().zip(&end.1).all(|(a, b)| (a - b).abs() <= SAME as f32);
+        still && start.0.iter().zip(&end.0).all(|(a, b)| same(a, b, size))
+    }
+}
+
+/// The longest side of the box around the bones, metres; one for a lone bone.
+fn extent(bones: &[DAffine3]) -> f64 {
+    let low = bones.iter().map(|b| b.translation).reduce(|a, b| a.min(b)).unwrap_or_default();
+    let high = bones.iter().map(|b| b.translation).reduce(|a, b| a.max(b)).unwrap_or_default();
+    let size = (high - low).max_element();
+    if size > 0.0 { size } else { 1.0 }
+}
+
+fn same(a: &DAffine3, b: &DAffine3, size: f64) -> bool {
+    let scale = a.matrix3.x_axis.length().max(1e-12);
+    let turned = (0..3).all(|i| (a.matrix3.col(i) - b.matrix3.col(i)).length() <= SAME * scale);
+    turned && (a.translation - b.translation).length() <= SAME * size
+}
