@@ -264,12 +264,10 @@ impl Character {
         scratch: &mut Scratch,
         out: &mut Vec<Vec3>,
     ) {
-        let Scratch { morphed, palette, deformed } = scratch;
-        let rest = Rest { normals: &[], tangents: &[], ..self.morph(instance, pose, morphed) };
+        let Scratch { morphed, palette } = scratch;
+        let rest = self.morph(instance, pose, morphed);
         let method = self.palette(instance, posed, center, palette);
-        std::mem::swap(&mut deformed.positions, out);
-        skin::deform(method, rest, palette, deformed);
-        std::mem::swap(&mut deformed.positions, out);
+        skin::deform_positions(method, rest.positions, palette, out);
     }
 
     /// World positions of an instance, all in f64: the slow reference for [`positions`](Self::positions). `bones` are
@@ -323,5 +321,4 @@ impl Character {
 pub struct Scratch {
     morphed: Morphed,
     palette: Vec<Affine3A>,
-    deformed: Deformed,
 }

@@ -64,6 +64,14 @@ fn wrong_usage_is_2_and_bad_input_is_3() {
         (vec!["render", &input, "-o", "a.jpg"], 2, ".png"),
         (vec!["render", &input, "-o", &out, "--size", "0"], 2, "16384"),
         (vec!["render", &input, "-o", &out, "--camera", "yaw=x"], 2, "expected yaw=DEG"),
+        (vec!["render", &input, "-o", &out, "--camera", "front,sideways"], 2, "`sideways` is not understood"),
+        (vec!["render", &input, "-o", &out, "--eye", "0,1,2"], 2, "--look-at"),
+        (vec!["render", &input, "-o", &out, "--eye", "0,2,0", "--look-at", "0,1,0"], 2, "no picture plane"),
+        (vec!["render", &input, "-o", &out, "--crop", "500,0,20,1"], 2, "512x512"),
+        (vec!["render", &input, "-o", &out, "--turntable", "0"], 2, "seconds"),
+        (vec!["render", &input, "-o", &out, "--path", "flog"], 2, "near names: flag"),
+        (vec!["render", &input, "-o", &out, "--follow", "7"], 2, "near names: flag"),
+        (vec!["render", &input, "-o", &out, "--onion", "3,0"], 2, "ghosts"),
         (vec!["render", &input, "-o", &out, "--clip", "dance"], 2, "the file has: 0 wave"),
         (vec!["render", &input, "-o", &out, "--frames", "1-48x0"], 2, "step"),
         (vec!["render", &input, "-o", &out, "--frames", "1-2"], 2, "####"),
@@ -130,6 +138,31 @@ fn stills_sequences_and_films_are_written_whole_and_never_over_what_exists() {
     assert_eq!(std::fs::read(out("still.png")).unwrap(), before);
     run("still.png", &["--force"]);
     assert_ne!(std::fs::read(out("still.png")).unwrap(), before);
+}
+
+#[test]
+fn a_turntable_is_one_turn_long_and_says_where_the_clip_is_cut() {
+    let (dir, input) = folder();
+    let run = |folder: &str, more: &[&str]| {
+        let target = path(&dir, &format!("{folder}/f.##.png"));
+        let mut args = vec!["render", &input, "-o", &target, "--size", "40", "--fps", "4"];
+        args.extend(more);
+        let o = sinew(&args);
+        assert!(o.status.success(), "{}", text(&o.stderr));
+        let read = |p: &PathBuf| std::fs::read(p).unwrap();
+        (files(&dir.path().join(folder)).iter().map(read).collect::<Vec<_>>(), text(&o.stderr))
+    };
+    let (frames, note) = run("clip", &["--turntable", "1.5"]);
+    assert_eq!(frames.len(), 6);
+    assert!(note.contains("--turntable 2 shows it 2 times"), "{note}");
+    let (frames, note) = run("fits", &["--turntable", "2"]);
+    assert!(frames.len() == 8 && !note.contains("is cut"), "{note}");
+
+    // At rest the frame after the last is the first, and none before it.
+    let (frames, _) = run("rest", &["--turntable", "1.5", "--rest", "--frames", "1-7"]);
+    assert!(frames[6] == frames[0] && (1..6).all(|k| frames[k] != frames[0]));
+    let (default, _) = run("default", &["--turntable", "--rest"]);
+    assert_eq!(default.len(), 16, "four seconds");
 }
 
 #[test]

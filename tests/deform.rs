@@ -5,7 +5,7 @@ use sinew::fk::{self, Posed};
 use sinew::math::rotation::angle_between;
 use sinew::pose::Pose;
 use sinew::skeleton::{BoneDesc, BoneId, Skeleton};
-use sinew::skin::{Deformed, Method, Rest, Weights, deform};
+use sinew::skin::{Deformed, Method, Rest, Weights, deform, deform_positions};
 
 use crate::rng::Rng;
 
@@ -231,4 +231,23 @@ fn twist_bend_twist_back_is_a_bend_about_y() {
     let theta = Vec3::new(90_f32, 40.0, -90.0).map(f32::to_radians);
     let r = sinew::math::euler::rotation_from_xzx(theta);
     assert!(angle_between(r, Quat::from_rotation_y(40_f32.to_radians())) < 1e-6);
+}
+
+#[test]
+fn positions_alone_are_the_same_numbers() {
+    let mut rng = Rng::new(11);
+    let point = |rng: &mut Rng| Vec3::from_array([0; 3].map(|_| rng.range(-2.0, 2.0) as f32));
+    let rest: Vec<Vec3> = (0..50).map(|_| point(&mut rng)).collect();
+    let turn = |rng: &mut Rng| Affine3A::from_rotation_y(rng.range(-3.0, 3.0) as f32);
+    let palette = [turn(&mut rng), Affine3A::from_translation(point(&mut rng)), turn(&mut rng)];
+    let bones: Vec<u32> = (0..100).map(|i| i % 3).collect();
+    let shares: Vec<f32> =
+        (0..100).map(|i| if i % 10 < 2 { (1 - i % 2) as f32 } else { 0.3 + 0.004 * i as f32 }).collect();
+    let (weights, _) = Weights::new(2, &bones, &shares, 3, 0).unwrap();
+    for method in [Method::Rigid(2), Method::Linear(&weights)] {
+        let (mut all, mut alone) = (Deformed::default(), vec![Vec3::ONE; 3]);
+        deform(method, Rest { positions: &rest, normals: &[], tangents: &[] }, &palette, &mut all);
+        deform_positions(method, &rest, &palette, &mut alone);
+        assert_eq!(all.positions, alone);
+    }
 }

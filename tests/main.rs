@@ -3,6 +3,7 @@
 mod architecture;
 #[cfg(feature = "cli")]
 mod batch;
+mod channels;
 #[cfg(feature = "cli")]
 mod cli;
 #[cfg(feature = "cli")]
@@ -12,10 +13,18 @@ mod corpus;
 mod deform;
 #[cfg(feature = "io")]
 mod gltf;
+#[cfg(feature = "cli")]
+mod golden;
+#[cfg(feature = "io")]
+mod looks;
 #[cfg(feature = "pictures")]
 mod picture;
 mod raster;
 #[path = "../src/test_rng.rs"]
 mod rng;
+#[cfg(feature = "cli")]
+mod sheet;
 #[cfg(all(feature = "io", feature = "pictures"))]
 mod shots;
+#[cfg(all(feature = "io", feature = "pictures"))]
+mod views;

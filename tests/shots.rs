@@ -4,6 +4,7 @@ use sinew::frames::{Look, Shot, ShotDesc, View, Worker};
 use sinew::image::Rgba8;
 use sinew::io::{self, Import, Options};
 use sinew::render::Settings;
+use sinew::render::channel::{Channel, Channels};
 use sinew::render::raster::IdImage;
 use std::path::PathBuf;
 
@@ -94,5 +95,22 @@ fn a_worker_that_drew_something_else_draws_the_same() {
         shot.draw(0.2, &mut Worker::default(), &mut fresh);
         shot.draw(0.2, &mut used, &mut again);
         assert!(fresh == again, "{name}");
+    }
+}
+
+#[test]
+fn a_pixel_has_a_surface_exactly_where_it_has_alpha() {
+    let (mut worker, mut picture, mut seen) = (Worker::default(), Rgba8::default(), Channels::default());
+    for (name, import) in &rigs() {
+        for samples in [1, 4] {
+            let shot = shot(import, 0, [0.0; 4], settings(samples, 1));
+            shot.draw(0.2, &mut worker, &mut picture);
+            shot.draw_channels(0.2, &mut worker, &Channel::ALL, &mut seen);
+            for (i, p) in picture.data.as_chunks::<4>().0.iter().enumerate() {
+                let there = (seen.objects[i] > 0, seen.depth[i].is_finite(), seen.normals[i].length() > 0.9);
+                let alpha = p[3] > 0;
+                assert_eq!(there, (alpha, alpha, alpha), "{name}, {samples} samples, pixel {i}");
+            }
+        }
     }
 }

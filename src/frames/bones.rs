@@ -6,7 +6,7 @@ use super::worker::Worker;
 use crate::fk::Posed;
 use crate::image::color::linear_from_srgb;
 use crate::mesh::{Mesh, MeshData};
-use crate::scene::{Light, LightKind, Material, Object, Scene};
+use crate::scene::{Light, LightKind, Material, Object, Scene, Style};
 use crate::skeleton::{BoneId, Skeleton};
 use glam::{DVec3, Vec3, Vec4};
 use std::sync::LazyLock;
@@ -87,6 +87,7 @@ impl Figure {
         Scene {
             ambient: Vec3::splat(0.3),
             lights: vec![Light { kind: LightKind::Directional { direction }, color: Vec3::splat(0.85) }],
+            style: Style::default(),
             background: [0.0; 4],
             objects: vec![object],
             materials: &*MATERIALS,

@@ -160,7 +160,7 @@ impl Stage {
         let desc = ShadowDesc {
             direction: Vec3::Y,
             bounds: self.bounds,
-            margin: 0.35 * r,
+            margin: 0.3 * r,
             size: CONTACT_SIZE,
             radius: 1.5,
             bias: 0.012 * r,
@@ -172,8 +172,8 @@ impl Stage {
             // The map's near plane lies a little below the ground.
             let below = near.texel_from_scene.transform_point3(self.bounds[0]).z;
             near.depth.iter_mut().for_each(|z| *z -= below);
-            let strength = if look.shadows == Shadows::Map { 0.6 } else { 1.0 };
-            let parts = [[0.1 * r, 0.05 * r, 0.55 * strength], [0.5 * r, 0.2 * r, 0.5 * strength]];
+            let strength = if look.shadows == Shadows::Map { 0.7 } else { 1.0 };
+            let parts = [[0.12 * r, 0.035 * r, 0.8 * strength], [0.7 * r, 0.2 * r, 0.65 * strength]];
             contact.contact(near, &parts);
         }
         if look.shadows == Shadows::Map

@@ -1,7 +1,7 @@
 //! The nearest eye that sees all it must.
 
 use crate::scene::{Camera, Projection};
-use glam::{Affine3A, Mat3A, Vec3, Vec3A};
+use glam::{Affine3A, Mat3A, Vec3, Vec3A, Vec4};
 use std::f32::consts::TAU;
 
 /// Which turns of the camera around its axis a framing holds.
@@ -102,15 +102,16 @@ impl Framing {
         let view_from_scene = self.scene_from_view.transpose() * back;
         let shift = self.scene_from_view.transpose() * (self.axis - back * self.axis);
         let [sx, sy] = self.slope;
+        let (slope, sign) = (Vec4::new(sx, sx, sy, sy), Vec4::new(1.0, -1.0, 1.0, -1.0));
+        // All edges at once, and the maxima in registers: this sees every vertex at every moment.
+        let (mut edges, mut low, mut high) = (Vec4::from_array(self.edges), self.low, self.high);
         for p in points.iter().filter(|p| p.is_finite()) {
             let p = view_from_scene * Vec3A::from(*p) + shift;
-            let e = [p.x + sx * p.z, sx * p.z - p.x, p.y + sy * p.z, sy * p.z - p.y];
-            for (max, e) in self.edges.iter_mut().zip(e) {
-                *max = max.max(e);
-            }
-            self.low = self.low.min(p);
-            self.high = self.high.max(p);
+            edges = (Vec4::new(p.x, p.x, p.y, p.y) * sign + slope * p.z).max(edges);
+            low = p.min(low);
+            high = p.max(high);
         }
+        (self.edges, self.low, self.high) = (edges.to_array(), low, high);
     }
 
     /// Keep in the picture all circles that points run on.

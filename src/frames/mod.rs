@@ -29,8 +29,8 @@ use crate::character::Instance;
 use crate::fk::Posed;
 use crate::image::develop::Developer;
 use crate::image::{Image, Rgba8};
-use crate::render::Settings;
 use crate::render::raster::{IdImage, Stats};
+use crate::render::{Settings, Window};
 use crate::scene::{Camera, Material, Object, Scene};
 use crate::skin::Deformed;
 use crate::time::{self, Range, Wrap};
@@ -58,6 +58,8 @@ pub struct ShotDesc {
     pub overlays: Overlays,
     /// Size and samples of the pictures.
     pub settings: Settings,
+    /// The part of the pictures that is drawn: to the same bytes as in the whole.
+    pub crop: Option<Window>,
 }
 
 impl Default for ShotDesc {
@@ -71,6 +73,7 @@ impl Default for ShotDesc {
             look: Look::default(),
             overlays: Overlays::default(),
             settings: Settings::default(),
+            crop: None,
         }
     }
 }
@@ -190,22 +193,46 @@ impl<'a> Shot<'a> {
         character.instances().iter().map(|i| character.mesh(i).name.clone()).collect()
     }
 
+    /// Pixels a row, and rows, of its pictures.
+    pub fn size(&self) -> [usize; 2] {
+        let part = self.part(self.desc.crop);
+        [part.width, part.height]
+    }
+
+    /// What of a window is in the picture; all of it for `None`.
+    fn part(&self, window: Option<Window>) -> Window {
+        let Settings { width, height, .. } = self.desc.settings;
+        window.unwrap_or(Window { x: 0, y: 0, width, height }).within(width, height)
+    }
+
     /// Draw a moment with the buffers of `worker`.
     pub fn draw(&self, moment: impl Into<Moment>, worker: &mut Worker, out: &mut Rgba8) -> FrameStats {
         if self.desc.look.is_direct() && self.desc.overlays.is_empty() {
             return self
                 .with_scene(moment.into(), worker, |scene, w| w.draw(scene, &self.desc.settings, out));
         }
+        // What a grade makes of a pixel may depend on its neighbours and on its place.
+        let window = self.desc.crop.filter(|_| self.desc.look.is_direct());
         let mut light = std::mem::take(&mut worker.light);
-        let stats = self.draw_linear(moment, worker, &mut light);
+        let stats = self.draw_layers(moment.into(), worker, window, &mut light);
         self.developer.develop(&light, out);
         worker.light = light;
+        if window != self.desc.crop {
+            self.part(self.desc.crop).cut(4, out.width, &mut out.data);
+            [out.width, out.height] = self.size();
+        }
         stats
     }
 
     /// Draw a moment in linear light, alpha premultiplied. The look's grade is not applied.
     pub fn draw_linear(&self, moment: impl Into<Moment>, worker: &mut Worker, out: &mut Image) -> FrameStats {
-        self.draw_layers(moment.into(), worker, out)
+        let window = self.desc.crop.filter(|_| self.stage.is_none());
+        let stats = self.draw_layers(moment.into(), worker, window, out);
+        if window != self.desc.crop {
+            self.part(self.desc.crop).cut(1, out.width, &mut out.pixels);
+            [out.width, out.height] = self.size();
+        }
+        stats
     }
 
     /// Which object and triangle is seen at the centre of each pixel of a moment, and how far away.
@@ -227,6 +254,7 @@ impl<'a> Shot<'a> {
         let start = Instant::now();
         let camera = self.stand.camera(moment, &worker.posed, &worker.deformed);
         let scene = self.scene(camera, &worker.posed, &worker.deformed);
+        worker.rasterizer.set_window(self.desc.crop);
         stats.raster = draw(&scene, &mut worker.rasterizer);
         stats.times.draw = start.elapsed();
         stats

@@ -12,6 +12,7 @@ use super::view::ViewError;
 use super::{FrameStats, Moment, Shot, Worker};
 use crate::image::Image;
 use crate::image::composite::Operator;
+use crate::render::Window;
 use crate::scene::Camera;
 use crate::skeleton::BoneId;
 use std::time::Instant;
@@ -141,14 +142,21 @@ fn check(span: &Span, overlays: &Overlays) -> Result<(), ViewError> {
 }
 
 impl Shot<'_> {
-    /// Draw a moment with its overlays.
-    pub(super) fn draw_layers(&self, moment: Moment, worker: &mut Worker, out: &mut Image) -> FrameStats {
+    /// Draw a window of a moment with its overlays.
+    pub(super) fn draw_layers(
+        &self,
+        moment: Moment,
+        worker: &mut Worker,
+        window: Option<Window>,
+        out: &mut Image,
+    ) -> FrameStats {
         let overlays = &self.desc.overlays;
         let mut layer = std::mem::take(&mut worker.layer);
         let mut stats = FrameStats::default();
         self.pose(moment.time, worker, &mut stats);
         let camera = self.stand.camera(moment, &worker.posed, &worker.deformed);
 
+        worker.rasterizer.set_window(window);
         let whole = overlays.onion.is_none() && overlays.xray.is_none();
         let background = self.desc.look.background;
         if whole && self.stage.is_none() {
@@ -157,7 +165,7 @@ impl Shot<'_> {
             self.character(&camera, [0.0; 4], worker, out, &mut stats);
             self.put_behind(&camera, worker, out);
         } else {
-            self.clear(out);
+            self.clear(window, out);
             if let Some(o) = &overlays.onion {
                 onion::ghosts(self, o, moment.time, &camera, worker, out, &mut stats);
                 self.pose(moment.time, worker, &mut stats);
@@ -172,16 +180,18 @@ impl Shot<'_> {
         if overlays.xray.is_none() {
             self.bones(&camera, worker, &mut layer, out, &mut stats);
         }
+        let corner = window.map_or([0, 0], |w| [w.x, w.y]);
         for trail in &self.layers.trails {
-            trail.draw(self, moment.time, &camera, &worker.posed, &mut layer, out);
+            trail.draw(self, moment.time, &camera, &worker.posed, [&mut layer, out], corner);
         }
         worker.layer = layer;
         stats
     }
 
-    /// An empty picture of the shot's size.
-    fn clear(&self, out: &mut Image) {
-        (out.width, out.height) = (self.desc.settings.width, self.desc.settings.height);
+    /// An empty picture of a window's size.
+    fn clear(&self, window: Option<Window>, out: &mut Image) {
+        let part = self.part(window);
+        (out.width, out.height) = (part.width, part.height);
         out.pixels.clear();
         out.pixels.resize(out.width * out.height, [0.0; 4]);
     }

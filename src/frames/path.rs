@@ -1,10 +1,10 @@
 //! The way of a bone through the whole clip, drawn over the picture.
 
-use super::Shot;
 use super::fit::Span;
 use super::overlay::PathDesc;
-use super::stroke::{self, Ink};
+use super::stroke::{self, Ink, Pad};
 use super::worker::Worker;
+use super::{Shot, ShotDesc};
 use crate::clip::{Clip, Target};
 use crate::fk::Posed;
 use crate::image::Image;
@@ -66,17 +66,17 @@ impl Trail {
         Self { desc: *desc, places, keys, range }
     }
 
-    /// Draw the path on a picture, as it is seen at a time.
+    /// Draw the path on a picture that begins at pixel `corner` of the whole, as it is seen at a time.
     pub fn draw(
         &self,
         shot: &Shot,
         time: f64,
         camera: &Camera,
         posed: &Posed,
-        layer: &mut Image,
-        out: &mut Image,
+        [layer, out]: [&mut Image; 2],
+        corner: [usize; 2],
     ) {
-        let lens = Lens::new(camera, shot.aspect(), [out.width, out.height]);
+        let lens = Lens::new(camera, shot.aspect(), &shot.desc);
         let now = wrap(time, self.range, shot.desc.wrap);
         let width = f64::from(self.desc.width_px);
         let colors = shot.desc.overlays.colors;
@@ -95,7 +95,7 @@ impl Trail {
                 let i = ink(0.5 * (two[0].0 + two[1].0));
                 let thick = if halo { width + 2.0 * HALO_PX } else { width };
                 stroke::line(
-                    layer,
+                    &mut Pad { image: layer, corner },
                     ends,
                     thick,
                     if halo { Ink { alpha: HALO.alpha * i.alpha, ..HALO } } else { i },
@@ -107,8 +107,8 @@ impl Trail {
         // Dots of frames, of keys, and of now.
         let dot = |out: &mut Image, p: DVec3, radius: f64, ink: Ink| {
             if let Some(at) = lens.point(p) {
-                stroke::dot(out, at, radius * width + HALO_PX, HALO);
-                stroke::dot(out, at, radius * width, ink);
+                stroke::dot(&mut Pad { image: out, corner }, at, radius * width + HALO_PX, HALO);
+                stroke::dot(&mut Pad { image: out, corner }, at, radius * width, ink);
             }
         };
         for (t, p) in self.places.iter().step_by(BETWEEN) {
@@ -152,16 +152,18 @@ fn keys(clip: &Clip, skeleton: &Skeleton, bone: BoneId) -> Vec<f64> {
 /// From the scene to pixels.
 struct Lens {
     clip_from_scene: DMat4,
+    /// Of the whole picture.
     size: DVec2,
     /// The least `w` that is in front of the eye.
     near: f64,
 }
 
 impl Lens {
-    fn new(camera: &Camera, aspect: f32, [width, height]: [usize; 2]) -> Self {
+    fn new(camera: &Camera, aspect: f32, desc: &ShotDesc) -> Self {
         let clip_from_scene = camera.clip_from_scene(aspect).as_dmat4();
         let near = f64::from(camera.near).min(1.0);
-        Self { clip_from_scene, size: DVec2::new(width as f64, height as f64), near }
+        let pixels = |x: usize, y: usize| DVec2::new(x as f64, y as f64);
+        Self { clip_from_scene, size: pixels(desc.settings.width, desc.settings.height), near }
     }
 
     fn clip(&self, p: DVec3) -> DVec4 {

@@ -1,4 +1,4 @@
-//! Looks: light, background and changes of materials in JSON that people write (`poses/README.md` describes every field).
+//! Looks: light, background and changes of materials in JSON that people write (`rigs/looks/README.md` describes every field).
 //!
 //! A key that the format does not have is an error that names it, because hand-written files have typos.
 

@@ -138,7 +138,10 @@ impl Frame {
     }
 
     fn aseprite(index: usize, s: &Sprite) -> Self {
-        Self { filename: Some(index.to_string()), duration: Some(s.duration_ms), ..Self::new(s) }
+        // Phaser reads the pivot here, and passes slices over.
+        let [x, y] = s.pivot.map(short);
+        let filename = Some(index.to_string());
+        Self { filename, duration: Some(s.duration_ms), pivot: Some(Point { x, y }), ..Self::new(s) }
     }
 }
 

@@ -46,6 +46,43 @@ pub enum SettingsError {
     },
 }
 
+/// A part of a picture, in pixels from its top left corner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Window {
+    /// First column.
+    pub x: usize,
+    /// First row.
+    pub y: usize,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+impl Window {
+    /// What of it lies in a picture of these sides.
+    ///
+    /// ```
+    /// use sinew::render::Window;
+    /// let w = Window { x: 6, y: 0, width: 4, height: 2 };
+    /// assert_eq!(w.within(8, 8), Window { width: 2, ..w });
+    /// assert_eq!(w.within(4, 4), Window { x: 4, width: 0, ..w });
+    /// ```
+    pub fn within(self, width: usize, height: usize) -> Self {
+        let (x, y) = (self.x.min(width), self.y.min(height));
+        Self { x, y, width: self.width.min(width - x), height: self.height.min(height - y) }
+    }
+
+    /// Leave of a list with `n` entries a pixel, in rows of `columns` pixels, those of the window.
+    pub(crate) fn cut<T: Copy>(self, n: usize, columns: usize, list: &mut Vec<T>) {
+        for row in 0..self.height {
+            let from = n * ((self.y + row) * columns + self.x);
+            list.copy_within(from..from + n * self.width, n * row * self.width);
+        }
+        list.truncate(n * self.width * self.height);
+    }
+}
+
 impl Settings {
     /// The most pixels along a side.
     pub const MAX_SIZE: usize = 16384;

@@ -12,8 +12,10 @@ pub struct Outline {
     pub color: [f32; 4],
 }
 
-/// A contour runs between two neighbours of which the farther lies so many steps of the surface before it further away.
+/// A contour runs between two neighbours of which one lies so many steps of the surface further away.
 const JUMP: f32 = 4.0;
+/// From so many steps on it is drawn in full: lines fade in and do not break up into dots.
+const FULL: f32 = 10.0;
 /// The least of such a step: so many pixels' worth of distance.
 const STEP: f32 = 1.5;
 
@@ -22,20 +24,18 @@ impl Outline {
     /// (perspective) or anywhere (parallel).
     ///
     /// Contours run between pixels: where something meets nothing, and where depth jumps. A jump is more than the surfaces on both
-    /// sides change within a pixel, so that slopes, however steep, are none. A pixel's coverage falls from 1 to 0 within a pixel around half the width from
-    /// the nearest contour.
+    /// sides change within a pixel, so that slopes, however steep, are none. A pixel's coverage falls from 1 to 0 within a pixel
+    /// around half the width from the nearest contour.
     pub fn draw(&self, ids: &IdImage, pixel: f32, perspective: bool, picture: &mut Image) {
         let (w, h) = (ids.width, ids.height);
         let mut cover = vec![0.0f32; w * h];
         let footprint = |z: f32| if perspective { pixel * z } else { pixel };
         for y in 0..h {
             for x in 0..w {
-                if x + 1 < w && parted(ids, [x, y], [1, 0], footprint) {
-                    self.splat(&mut cover, [w, h], [x as f32 + 0.5, y as f32]);
-                }
-                if y + 1 < h && parted(ids, [x, y], [0, 1], footprint) {
-                    self.splat(&mut cover, [w, h], [x as f32, y as f32 + 0.5]);
-                }
+                let right = if x + 1 < w { parted(ids, [x, y], [1, 0], footprint) } else { 0.0 };
+                let down = if y + 1 < h { parted(ids, [x, y], [0, 1], footprint) } else { 0.0 };
+                self.splat(&mut cover, [w, h], [x as f32 + 0.5, y as f32], right);
+                self.splat(&mut cover, [w, h], [x as f32, y as f32 + 0.5], down);
             }
         }
         for (p, cover) in picture.pixels.iter_mut().zip(&cover) {
@@ -47,7 +47,10 @@ impl Outline {
     }
 
     /// Cover the pixels around a point of a contour, in pixels from the first pixel's centre.
-    fn splat(&self, cover: &mut [f32], [w, h]: [usize; 2], at: [f32; 2]) {
+    fn splat(&self, cover: &mut [f32], [w, h]: [usize; 2], at: [f32; 2], strength: f32) {
+        if strength <= 0.0 {
+            return;
+        }
         let reach = 0.5 * self.width + 0.5;
         let span = |c: f32, n: usize| {
             let (a, b) = ((c - reach).ceil().max(0.0), (c + reach).floor().min(n as f32 - 1.0));
@@ -57,14 +60,14 @@ impl Outline {
             for x in span(at[0], w) {
                 let distance = (x as f32 - at[0]).hypot(y as f32 - at[1]);
                 let c = &mut cover[y * w + x];
-                *c = c.max((reach - distance).clamp(0.0, 1.0));
+                *c = c.max(strength * (reach - distance).clamp(0.0, 1.0));
             }
         }
     }
 }
 
-/// Whether a contour runs between a pixel and its neighbour.
-fn parted(ids: &IdImage, [x, y]: [usize; 2], [dx, dy]: [usize; 2], footprint: impl Fn(f32) -> f32) -> bool {
+/// Whether a contour runs between a pixel and its neighbour: 0 to 1.
+fn parted(ids: &IdImage, [x, y]: [usize; 2], [dx, dy]: [usize; 2], footprint: impl Fn(f32) -> f32) -> f32 {
     let at = |k: isize| {
         let (x, y) = (x as isize + k * dx as isize, y as isize + k * dy as isize);
         let inside = x >= 0 && y >= 0 && x < ids.width as isize && y < ids.height as isize;
@@ -72,13 +75,13 @@ fn parted(ids: &IdImage, [x, y]: [usize; 2], [dx, dy]: [usize; 2], footprint: im
     };
     let (a, b) = match (at(0), at(1)) {
         (Some(a), Some(b)) => (a, b),
-        (a, b) => return a.is_some() != b.is_some(),
+        (a, b) => return f32::from(u8::from(a.is_some() != b.is_some())),
     };
     // The surface's own slope on either side, as far as it goes on there.
     let slope = |z: f32, before: Option<f32>| before.map_or(0.0, |q| (z - q).abs());
     let (left, right) = (slope(a, at(-1)), slope(b, at(2)));
     let step = STEP * footprint(a.min(b)) + left.min(right);
-    (b - a).abs() > JUMP * step
+    (((b - a).abs() / step - JUMP) / (FULL - JUMP)).clamp(0.0, 1.0)
 }
 
 #[cfg(test)]

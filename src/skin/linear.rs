@@ -2,7 +2,7 @@
 
 use super::{Deformed, Rest, Weights};
 use crate::math::{normal_from, unit_or};
-use glam::{Affine3A, Mat3A, Vec3A};
+use glam::{Affine3A, Mat3A, Vec3, Vec3A};
 
 /// `V` vertices, each blended from `weights.per_vertex()` matrices of the palette.
 pub(super) fn deform(rest: Rest, weights: &Weights, palette: &[Affine3A], out: &mut Deformed) {
@@ -23,6 +23,12 @@ pub(super) fn deform(rest: Rest, weights: &Weights, palette: &[Affine3A], out: &
         }
     }
     out.mirrored = 2 * inside_out > rest.positions.len();
+}
+
+/// Positions alone.
+pub(super) fn positions(rest: &[Vec3], weights: &Weights, palette: &[Affine3A], out: &mut Vec<Vec3>) {
+    let moved = |(i, p): (usize, &Vec3)| blend(weights.of(i), palette).transform_point3(*p);
+    out.extend(rest.iter().enumerate().map(moved));
 }
 
 #[inline]

@@ -76,3 +76,21 @@ pub fn deform(method: Method, rest: Rest, palette: &[Affine3A], out: &mut Deform
         }
     }
 }
+
+/// Deform positions alone: the same numbers as [`deform`] gives, without what normals need.
+///
+/// # Panics
+/// As [`deform`].
+pub fn deform_positions(method: Method, rest: &[Vec3], palette: &[Affine3A], out: &mut Vec<Vec3>) {
+    out.clear();
+    match method {
+        Method::Rigid(bone) => {
+            let m = &palette[bone];
+            out.extend(rest.iter().map(|p| m.transform_point3(*p)));
+        }
+        Method::Linear(weights) => {
+            assert_eq!(weights.vertex_count(), rest.len(), "weights of another mesh");
+            linear::positions(rest, weights, palette, out);
+        }
+    }
+}

@@ -6,29 +6,38 @@ use sinew::skeleton::{BoneId, Skeleton};
 /// Names that are shown where none fits.
 const SHOWN: usize = 8;
 
-/// The bone that an option names: as written, else whatever the case of its letters, else by index.
+/// The bone that an option names: as written, else by its letters and digits whatever their case, else by index.
 pub fn find_bone(skeleton: &Skeleton, option: &str, name: &str) -> Result<BoneId, Failure> {
-    let lower = name.to_lowercase();
+    let plain = plain(name);
     let index = name.parse::<u32>().ok().filter(|&i| (i as usize) < skeleton.len()).map(BoneId);
-    let loose = || skeleton.ids().find(|&b| skeleton.name(b).to_lowercase() == lower);
+    let loose = || skeleton.ids().find(|&b| !plain.is_empty() && self::plain(skeleton.name(b)) == plain);
     skeleton.find(name).or_else(loose).or(index).ok_or_else(|| {
-        let near: Vec<String> = near(skeleton, &lower).into_iter().map(say::name).collect();
+        let near: Vec<String> = near(skeleton, &plain).into_iter().map(say::name).collect();
         let count = skeleton.len();
-        let rest =
-            if count > near.len() { format!(" (of {count}; `sinew info` lists all)") } else { String::new() };
+        let rest = if count > near.len() {
+            format!(" (of {count}; `sinew info --json` lists all)")
+        } else {
+            String::new()
+        };
         let has = if near.is_empty() { "there are none".into() } else { near.join(", ") };
         Failure::Usage(format!("{option} {name}: there is no such bone; near names: {has}{rest}"))
     })
 }
 
-/// The names most like `lower`, best first: those that contain it, then by edits.
-fn near<'s>(skeleton: &'s Skeleton, lower: &str) -> Vec<&'s str> {
+/// Letters and digits, in lower case.
+fn plain(name: &str) -> String {
+    name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
+}
+
+/// The names most like a plain one, best first: those that contain it, then by edits.
+fn near<'s>(skeleton: &'s Skeleton, name: &str) -> Vec<&'s str> {
     let mut all: Vec<(usize, &str)> = skeleton
         .ids()
         .map(|b| {
-            let other = skeleton.name(b).to_lowercase();
-            let part = !other.is_empty() && (other.contains(lower) || lower.contains(&other));
-            (if part { 0 } else { 1 + edits(lower, &other) }, skeleton.name(b))
+            let other = plain(skeleton.name(b));
+            let part =
+                !name.is_empty() && !other.is_empty() && (other.contains(name) || name.contains(&other));
+            (if part { 0 } else { 1 + edits(name, &other) }, skeleton.name(b))
         })
         .collect();
     all.sort_by_key(|(d, _)| *d);

@@ -5,6 +5,7 @@ use crate::cli::Failure;
 use glam::DVec3;
 use sinew::asset::Asset;
 use sinew::frames::{FramingDesc, Pivot, Turns, View};
+use sinew::render::Window;
 
 /// Height of the film that `focal` speaks of, millimetres: still photography's 36 × 24.
 const FILM: f32 = 24.0;
@@ -46,6 +47,9 @@ pub struct CameraArgs {
     /// Larger by this factor, about the picture's middle.
     #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = parse_zoom)]
     zoom: f32,
+    /// Draw only this part of the picture: the very pixels that the whole of --size has there.
+    #[arg(long, value_name = "X,Y,W,H", value_parser = parse_crop)]
+    crop: Option<Window>,
     /// Walk once around the character in so many seconds, while the clip plays, or holding still with --rest or --at.
     #[arg(long, value_name = "SECONDS", num_args = 0..=1, default_missing_value = "4", value_parser = parse_lap, conflicts_with = "follow")]
     pub turntable: Option<f64>,
@@ -101,6 +105,17 @@ impl CameraArgs {
             turns: if around { Turns::All } else { Turns::None },
             pivot: if around { Pivot::Middle } else { Pivot::Origin },
         })
+    }
+
+    /// The part that is drawn of a picture of these sides.
+    pub fn crop(&self, [width, height]: [usize; 2]) -> Result<Option<Window>, Failure> {
+        match self.crop {
+            Some(c) if c.within(width, height) != c => Err(Failure::Usage(format!(
+                "--crop {},{},{},{}: this reaches out of the picture of {width}x{height} pixels",
+                c.x, c.y, c.width, c.height
+            ))),
+            crop => Ok(crop),
+        }
     }
 
     /// Whether nobody said where the camera stands.
@@ -184,6 +199,14 @@ fn parse_point(text: &str) -> Result<DVec3, String> {
             Ok(DVec3::new(x, y, z))
         }
         _ => Err("expected three numbers, as in 0,1.5,3".into()),
+    }
+}
+
+fn parse_crop(text: &str) -> Result<Window, String> {
+    let numbers: Option<Vec<usize>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some(&[x, y, width, height]) if width > 0 && height > 0 => Ok(Window { x, y, width, height }),
+        _ => Err("expected pixels from the left and the top, width and height, as in 100,50,320,200".into()),
     }
 }
 

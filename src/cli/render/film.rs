@@ -38,8 +38,7 @@ pub struct Job<'a> {
 impl Job<'_> {
     /// Pixels of a finished frame.
     pub fn size(&self) -> [usize; 2] {
-        let settings = &self.shot.desc().settings;
-        [settings.width * self.scale, settings.height * self.scale]
+        self.shot.size().map(|side| side * self.scale)
     }
 }
 

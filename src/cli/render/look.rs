@@ -26,7 +26,7 @@ pub struct LookArgs {
     /// key and a fill light if there are none.
     #[arg(long, value_name = "studio|sun|flat|asset|FILE")]
     light: Option<String>,
-    /// Lamps, background and changes of materials from a look file, which poses/README.md describes; other options go before it.
+    /// Lamps, background and changes of materials from a look file, which rigs/looks/README.md describes; other options go before it.
     #[arg(long, value_name = "FILE.json")]
     look: Option<PathBuf>,
     /// smooth, flat (facets), or toon[=STEPS]: so many tones, 2 to 16.

@@ -33,7 +33,7 @@ Examples:
   sinew render fox.glb -o side.apng --camera yaw=90,pitch=5,fov=20
   sinew render rigs/pip.json -o pip-sheet.png --sheet trimmed --directions 8 --camera pitch=30,yaw=0,ortho --size 128 --fps 12
   sinew render fox.glb -o fox-sheet.png --sheet grid --maps normal,depth,id --sheet-json aseprite --size 128
-  sinew render fox.glb -o fox.gif --pixel-art --pixel-scale 4 --size 256 --colors 16 --outline
+  sinew render fox.glb -o fox.gif --pixel-art --pixel-scale 4 --size 256 --colors 16 --pixel-outline
   sinew render fox.glb -o fox-contact.png --contact 6x4 --size 160
   sinew render fox.glb -o icon.png --camera isometric --background transparent
   sinew render rigs/fox.json -o round.gif --turntable
@@ -102,7 +102,8 @@ fn plan(args: &Args, task: &Task) -> Result<Plan, Failure> {
         task.target.check_frames(frames.len()).map_err(|e| Failure::Usage(e.to_string()))?;
     }
     let settings = args.output.settings()?;
-    Ok(Plan { frames, size: [settings.width, settings.height] })
+    let whole = [settings.width, settings.height];
+    Ok(Plan { frames, size: args.camera.crop(whole)?.map_or(whole, |c| [c.width, c.height]) })
 }
 
 /// Draw the frames of a plan and write them.
@@ -131,9 +132,11 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         framing: args.camera.framing(asset)?,
         look: args.look.look(asset, |m| say.warn(m))?,
         overlays: args.overlay.overlays(asset, args.time.fps)?,
+        crop: args.camera.crop([settings.width, settings.height])?,
         settings,
     };
     let background = if args.sheet.is_transparent() { [0.0; 4] } else { desc.look.background };
+    let transparent = look::transparent(&desc.look) || args.sheet.is_transparent();
     let start = Instant::now();
     let desc = args.sheet.desc(desc, asset);
     let shot = Shot::new(asset, desc).map_err(|e| Failure::Usage(e.to_string()))?;
@@ -143,7 +146,7 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         shot: &shot,
         frames: moments.as_ref().unwrap_or(&plan.frames),
         rate: args.time.fps,
-        transparent: look::transparent(&shot.desc().look) || args.sheet.is_transparent(),
+        transparent,
         target: task.target,
         level: args.output.png,
         threads,

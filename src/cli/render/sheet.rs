@@ -105,7 +105,7 @@ impl SheetArgs {
     /// that holds all directions.
     pub fn desc(&self, mut desc: ShotDesc, asset: &Asset) -> ShotDesc {
         if self.sheet.is_some() || self.pixels.is_on() {
-            desc.look.background = [0.0; 4];
+            (desc.look.background, desc.look.background_bottom) = ([0.0; 4], None);
         }
         if self.directions > 1 && desc.framing.turns == Turns::None {
             desc.framing.turns = Turns::Each(self.directions.into());

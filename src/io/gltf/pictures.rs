@@ -190,7 +190,9 @@ fn decode_all(jobs: &[Job]) -> Vec<Decoded> {
         }
     };
     let count = jobs.iter().flatten().count();
-    let threads = std::thread::available_parallelism().map_or(1, |n| n.get()).min(count);
+    // Asking for the processors costs as much as decoding an icon.
+    let threads =
+        if count > 1 { std::thread::available_parallelism().map_or(1, |n| n.get()).min(count) } else { 1 };
     std::thread::scope(|s| {
         (1..threads).for_each(|_| drop(s.spawn(work)));
         work();
@@ -200,6 +202,39 @@ fn decode_all(jobs: &[Job]) -> Vec<Decoded> {
 
 #[cfg(feature = "pictures")]
 fn decode(bytes: &[u8]) -> Result<Picture, String> {
+    match decode_jpeg(bytes) {
+        Some(picture) => Ok(picture),
+        None => decode_any(bytes),
+    }
+}
+
+/// A JPEG of luma and chroma straight into RGBA: without a copy in RGB, which costs as much again in fresh memory.
+///
+/// `None` where it is anything else, or where something is wrong that [`decode_any`] can name.
+#[cfg(feature = "pictures")]
+fn decode_jpeg(bytes: &[u8]) -> Option<Picture> {
+    use zune_jpeg::zune_core::{bytestream::ZCursor, colorspace::ColorSpace, options::DecoderOptions};
+    if !bytes.starts_with(b"\xff\xd8") {
+        return None;
+    }
+    let options = DecoderOptions::default()
+        .jpeg_set_out_colorspace(ColorSpace::RGBA)
+        .set_strict_mode(false)
+        .set_max_width(SIDE as usize)
+        .set_max_height(SIDE as usize);
+    let mut decoder = zune_jpeg::JpegDecoder::new_with_options(ZCursor::new(bytes), options);
+    decoder.decode_headers().ok()?;
+    let (width, height) = decoder.dimensions()?;
+    if decoder.input_colorspace()? != ColorSpace::YCbCr {
+        return None;
+    }
+    let mut rgba = vec![0; 4 * width * height];
+    decoder.decode_into(&mut rgba).ok()?;
+    Some(Picture { width, height, rgba })
+}
+
+#[cfg(feature = "pictures")]
+fn decode_any(bytes: &[u8]) -> Result<Picture, String> {
     let mut reader = reader(bytes)?;
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(SIDE);
@@ -220,4 +255,31 @@ fn reader(bytes: &[u8]) -> Result<image::ImageReader<std::io::Cursor<&[u8]>>, St
 #[cfg(not(feature = "pictures"))]
 fn decode(_: &[u8]) -> Result<Picture, String> {
     Err("pictures are not decoded in this build (feature `pictures`)".into())
+}
+
+#[cfg(all(test, feature = "pictures"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_short_way_into_rgba_gives_the_same_pixels() {
+        for (w, h) in [(1, 1), (16, 16), (61, 47), (200, 9)] {
+            let pixels = (0..w * h * 3).map(|i| (i * 37 % 251 + i / 7 % 40).min(255) as u8).collect();
+            let picture = image::RgbImage::from_raw(w, h, pixels).unwrap();
+            let mut bytes = std::io::Cursor::new(Vec::new());
+            picture.write_to(&mut bytes, image::ImageFormat::Jpeg).unwrap();
+            let (short, long) = (decode_jpeg(bytes.get_ref()).unwrap(), decode_any(bytes.get_ref()).unwrap());
+            assert_eq!((short.width, short.height), (w as usize, h as usize));
+            assert!(short.rgba == long.rgba);
+            // What is cut off is named, or read alike.
+            for n in [2, 100, bytes.get_ref().len() / 2] {
+                let cut = &bytes.get_ref()[..n.min(bytes.get_ref().len())];
+                assert_eq!(decode(cut).map(|p| p.rgba), decode_any(cut).map(|p| p.rgba));
+            }
+        }
+        let grey = image::GrayImage::from_pixel(5, 4, image::Luma([7]));
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        grey.write_to(&mut bytes, image::ImageFormat::Jpeg).unwrap();
+        assert!(decode_jpeg(bytes.get_ref()).is_none() && decode(bytes.get_ref()).is_ok());
+    }
 }

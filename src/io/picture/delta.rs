@@ -52,13 +52,41 @@ impl Rect {
     }
 }
 
-/// The smallest rectangle that holds every pixel that differs.
-pub(super) fn bounds<T: PartialEq>(before: &[T], after: &[T], width: usize) -> Option<Rect> {
-    bounds_where(before, after, width, |a, b| a != b)
+/// Pixels that are compared at a time.
+const WIDE: usize = 32;
+
+/// Whether some pixels are those. A comparison of slices would call the system's, which for so few costs more than it does.
+#[inline(always)]
+fn same<const N: usize>(a: &[[u8; N]], b: &[[u8; N]]) -> bool {
+    a.as_flattened().iter().zip(b.as_flattened()).fold(0, |d, (x, y)| d | (x ^ y)) == 0
 }
 
-/// The smallest rectangle that holds every pixel where `differs(before, after)`; it must not where both are equal.
-pub(super) fn bounds_where<T: PartialEq>(
+/// The first column in which two rows differ, and the first after the last.
+pub(super) fn span<const N: usize>(before: &[[u8; N]], after: &[[u8; N]]) -> Option<(usize, usize)> {
+    let wide = |row| <[[u8; N]]>::as_chunks::<WIDE>(row).0;
+    let skip = wide(before).iter().zip(wide(after)).take_while(|(a, b)| same(*a, *b)).count() * WIDE;
+    let differs = |x: &usize| before[*x] != after[*x];
+    let first = (skip..before.len().min(after.len())).find(differs)?;
+    let (before, after) = (&before[first..], &after[first..]);
+    let wide = |row| <[[u8; N]]>::as_rchunks::<WIDE>(row).1;
+    let skip =
+        wide(before).iter().rev().zip(wide(after).iter().rev()).take_while(|(a, b)| same(*a, *b)).count();
+    let differs = |x: &usize| before[*x] != after[*x];
+    let last = (0..before.len() - skip * WIDE).rfind(differs).unwrap_or_default();
+    Some((first, first + last + 1))
+}
+
+/// The smallest rectangle that holds every pixel that differs.
+pub(super) fn bounds<const N: usize>(before: &[[u8; N]], after: &[[u8; N]], width: usize) -> Option<Rect> {
+    let rows = before.chunks_exact(width).zip(after.chunks_exact(width)).enumerate();
+    let rects = rows.filter_map(|(y, (a, b))| {
+        span(a, b).map(|(left, right)| Rect { left, top: y, right, bottom: y + 1 })
+    });
+    rects.reduce(Rect::union)
+}
+
+/// The smallest rectangle that holds every pixel where `differs(before, after)`.
+pub(super) fn bounds_where<T>(
     before: &[T],
     after: &[T],
     width: usize,
@@ -66,10 +94,6 @@ pub(super) fn bounds_where<T: PartialEq>(
 ) -> Option<Rect> {
     let mut rect: Option<Rect> = None;
     for (y, (a, b)) in before.chunks_exact(width).zip(after.chunks_exact(width)).enumerate() {
-        // Whole rows compare many pixels at a time, and most rows of most films stand still.
-        if a == b {
-            continue;
-        }
         let differs = |x: &usize| differs(&a[*x], &b[*x]);
         let Some(left) = (0..width).find(differs) else { continue };
         let right = (0..width).rfind(differs).map_or(left, |x| x) + 1;
@@ -85,12 +109,28 @@ mod tests {
 
     #[test]
     fn the_rectangle_is_tight() {
-        let before = [0u8; 20];
+        let before = [[0u8]; 20];
         let mut after = before;
         assert_eq!(bounds(&before, &after, 5), None);
-        (after[7], after[13]) = (1, 1);
+        (after[7], after[13]) = ([1], [1]);
         let rect = bounds(&before, &after, 5).unwrap();
         assert_eq!(rect, Rect { left: 2, top: 1, right: 4, bottom: 3 });
+        assert_eq!(bounds_where(&before, &after, 5, |a, b| a != b), Some(rect));
         assert_eq!(rect.rows(5).collect::<Vec<_>>(), [7..9, 12..14]);
+    }
+
+    #[test]
+    fn spans_are_found_at_any_column() {
+        for width in [1, 15, 16, 17, 70] {
+            let row = vec![[7; 4]; width];
+            assert_eq!(span(&row, &row), None);
+            for first in 0..width {
+                for last in [first, (first + 20).min(width - 1)] {
+                    let mut other = row.clone();
+                    (other[first], other[last]) = ([7, 7, 8, 7], [9; 4]);
+                    assert_eq!(span(&row, &other), Some((first, last + 1)), "{width}");
+                }
+            }
+        }
     }
 }

@@ -42,12 +42,12 @@ pub fn encode_exr(picture: &Image, depth: ExrDepth) -> Result<Vec<u8>, Error> {
     let blocks = pixels.chunks(width * BLOCK_ROWS);
     let table = file.len();
     file.resize(table + 8 * blocks.len(), 0);
-    let (mut raw, mut sorted) = (Vec::new(), Vec::new());
+    let (mut raw, mut apart, mut sorted) = (Vec::new(), Vec::new(), Vec::new());
     for (k, rows) in blocks.enumerate() {
         let offset = file.len() as u64;
         file[table + 8 * k..][..8].copy_from_slice(&offset.to_le_bytes());
         gather(rows, width, depth, &mut raw);
-        take_apart(&raw, &mut sorted);
+        take_apart(&raw, &mut apart, &mut sorted);
         let packed = deflate(&sorted)?;
         // What does not shrink is stored as it is; readers tell by the size.
         let data = if packed.len() < raw.len() { &packed } else { &raw };
@@ -98,32 +98,38 @@ fn channel_list(depth: ExrDepth) -> Vec<u8> {
 
 /// Numbers of some rows: row by row, channel by channel.
 fn gather(rows: &[[f32; 4]], width: usize, depth: ExrDepth, out: &mut Vec<u8>) {
-    out.clear();
-    for row in rows.chunks(width) {
-        for (_, c) in CHANNELS {
+    let bytes = if depth == ExrDepth::Half { 2 } else { 4 };
+    out.resize(4 * bytes * rows.len(), 0);
+    for (line, row) in out.chunks_exact_mut(4 * bytes * width).zip(rows.chunks_exact(width)) {
+        for (to, (_, c)) in line.chunks_exact_mut(bytes * width).zip(CHANNELS) {
             match depth {
-                ExrDepth::Float => out.extend(row.iter().flat_map(|p| p[c].to_le_bytes())),
-                ExrDepth::Half => out.extend(row.iter().flat_map(|p| half(p[c]).to_le_bytes())),
+                ExrDepth::Float => store(to, row.iter().map(|p| p[c].to_le_bytes())),
+                ExrDepth::Half => store(to, row.iter().map(|p| half(p[c]).to_le_bytes())),
             }
         }
     }
 }
 
-/// Even bytes before odd ones, then each as its difference from the one before, plus 128.
-fn take_apart(raw: &[u8], out: &mut Vec<u8>) {
-    out.clear();
-    out.extend(raw.iter().step_by(2));
-    out.extend(raw.iter().skip(1).step_by(2));
-    let mut before = out.first().copied().unwrap_or_default();
-    for byte in out.iter_mut().skip(1) {
-        let now = *byte;
-        *byte = now.wrapping_sub(before).wrapping_add(128);
-        before = now;
+fn store<const N: usize>(to: &mut [u8], numbers: impl Iterator<Item = [u8; N]>) {
+    to.as_chunks_mut::<N>().0.iter_mut().zip(numbers).for_each(|(to, n)| *to = n);
+}
+
+/// Even bytes before odd ones, then each as its difference from the one before, plus 128. Their number is even.
+fn take_apart(raw: &[u8], apart: &mut Vec<u8>, out: &mut Vec<u8>) {
+    apart.resize(raw.len(), 0);
+    let (even, odd) = apart.split_at_mut(raw.len() / 2);
+    for ((pair, even), odd) in raw.as_chunks::<2>().0.iter().zip(even).zip(odd) {
+        [*even, *odd] = *pair;
     }
+    out.clear();
+    let Some((first, rest)) = apart.split_first() else { return };
+    out.push(*first);
+    out.extend(
+        rest.iter().zip(apart.iter()).map(|(now, before)| now.wrapping_sub(*before).wrapping_add(128)),
+    );
 }
 
 fn deflate(bytes: &[u8]) -> Result<Vec<u8>, Error> {
-    // On frames at 512² level 1 takes a third of the time of level 4 for 8 % more bytes.
     let mut encoder =
         flate2::write::ZlibEncoder::new(Vec::with_capacity(bytes.len() / 4), flate2::Compression::new(1));
     let packed = encoder.write_all(bytes).and_then(|()| encoder.finish());

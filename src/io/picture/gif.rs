@@ -89,7 +89,7 @@ impl<W: Write> GifWriter<W> {
     fn emit(&mut self, next: Option<&[u8]>, end: u64) -> Result<(), Error> {
         let Some(Waiting { indices, start }) = self.waiting.take() else { return Ok(()) };
         let (hole, width) = (self.hole, self.film.size[0]);
-        let changed = bounds(&self.canvas, &indices, width);
+        let changed = bounds(self.canvas.as_chunks::<1>().0, indices.as_chunks::<1>().0, width);
         // Pixels that become holes cannot be drawn: this frame's rectangle covers them and is cleared after it.
         let cleared = next.and_then(|n| bounds_where(&indices, n, width, |a, b| *a != hole && *b == hole));
         let rect = match (self.report.frames, changed, cleared) {

@@ -52,6 +52,16 @@ pub struct FrameEncoder<'a> {
 #[derive(Clone, Debug)]
 pub struct EncodedFrame(Packet);
 
+impl EncodedFrame {
+    /// Bytes that it takes in memory.
+    pub fn bytes(&self) -> usize {
+        match &self.0 {
+            Packet::Indexed(frame) => frame.indices.len(),
+            Packet::Coded { bytes, .. } | Packet::Plain(bytes) => bytes.len(),
+        }
+    }
+}
+
 /// What is in an encoded frame.
 #[derive(Clone, Debug)]
 pub(super) enum Packet {

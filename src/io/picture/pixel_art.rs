@@ -53,8 +53,7 @@ impl PixelArt {
             // The colours that are given beforehand come last; what is there already needs no place.
             let room = colors.saturating_sub(kept.len()).max(1);
             let sharp: Vec<Rgba8> = frames.iter().map(|f| sharpened(f, desc.background)).collect();
-            let film = film(desc.background, [0; 2]);
-            let mut found = Palette::from_frames(&sharp, room + 1, &film).colors().to_vec();
+            let mut found = Palette::from_frames(&sharp, room + 1, &film()).colors().to_vec();
             for color in kept {
                 if !found.contains(&color) && found.len() < colors {
                     found.push(color);
@@ -85,40 +84,40 @@ impl PixelArt {
 
     /// A mapper for [`finish`](Self::finish): one a thread.
     pub fn mapper(&self) -> Mapper {
-        Mapper::new(&self.palette, &film(self.matte, [0; 2]))
+        Mapper::new(&self.palette, &film())
     }
 
     /// A drawn frame in the palette's colours, outlined, laid over the background and enlarged.
     pub fn finish(&self, mapper: &mut Mapper, frame: &Rgba8) -> Indexed {
         let mut small = mapper.map(&sharpened(frame, self.matte), self.dither);
         let hole = self.palette.transparent();
-        if let Some(outline) = self.outline {
-            small.indices = outlined(&small, hole, outline);
-        }
         small.indices.iter_mut().filter(|i| **i == hole).for_each(|i| *i = self.behind);
+        if let Some(line) = self.outline {
+            draw_outline(&mut small, frame, line);
+        }
         if self.scale == 1 { small } else { small.enlarged(self.scale) }
     }
 }
 
-/// A film that keeps its holes, over a matte.
-fn film(matte: Option<[u8; 3]>, size: [usize; 2]) -> Film {
-    Film {
-        size,
-        frames: 1,
-        rate: Default::default(),
-        plays: 0,
-        transparent: true,
-        matte: matte.unwrap_or_default(),
-    }
+/// A film that keeps its holes.
+fn film() -> Film {
+    Film { transparent: true, ..Film::new([0; 2], 1, Default::default()) }
 }
 
-/// All or nothing: half covered pixels become whole. Without a background their colour stays as it is.
+/// All or nothing. Without a background, pixels that are covered by half or more become whole, in their own colour; before one,
+/// whatever is there (glass, a shadow on the ground) is laid over it.
 fn sharpened(frame: &Rgba8, background: Option<[u8; 3]>) -> Rgba8 {
     let mut frame = frame.clone();
-    if background.is_none() {
-        for p in frame.data.as_chunks_mut::<4>().0 {
-            p[3] = if p[3] < 128 { 0 } else { 255 };
-        }
+    let over = background.map(|matte| Film { matte, ..film() });
+    for p in frame.data.as_chunks_mut::<4>().0 {
+        *p = match (*p, over) {
+            ([.., 0], _) => [0; 4],
+            (p, Some(film)) => {
+                let [r, g, b] = film.over_matte(p);
+                [r, g, b, 255]
+            }
+            ([r, g, b, a], None) => [r, g, b, if a < 128 { 0 } else { 255 }],
+        };
     }
     frame
 }
@@ -130,20 +129,19 @@ fn nearest(palette: &Palette, color: [u8; 3]) -> u8 {
     best.map_or(0, |(i, _)| i as u8)
 }
 
-/// Holes that touch the character along a side become the line around it.
-fn outlined(picture: &Indexed, hole: u8, line: u8) -> Vec<u8> {
+/// Pixels that touch the character along a side, and are not covered by half, become the line around it.
+fn draw_outline(picture: &mut Indexed, frame: &Rgba8, line: u8) {
     let [w, h] = picture.size;
-    let solid = |x: usize, y: usize| x < w && y < h && picture.indices[y * w + x] != hole;
+    let solid = |x: usize, y: usize| x < w && y < h && frame.data[4 * (y * w + x) + 3] >= 128;
     let touches = |x: usize, y: usize| {
         solid(x.wrapping_sub(1), y) || solid(x + 1, y) || solid(x, y.wrapping_sub(1)) || solid(x, y + 1)
     };
-    let mut out = picture.indices.clone();
-    for (at, index) in out.iter_mut().enumerate().filter(|(_, i)| **i == hole) {
-        if touches(at % w, at / w) {
+    for (at, index) in picture.indices.iter_mut().enumerate() {
+        let (x, y) = (at % w, at / w);
+        if !solid(x, y) && touches(x, y) {
             *index = line;
         }
     }
-    out
 }
 
 #[cfg(test)]
@@ -178,8 +176,11 @@ mod tests {
         let art = PixelArt::new(desc, &[dot()], None);
         let got = art.finish(&mut art.mapper(), &dot());
         assert_eq!(got.size, [15, 15]);
+        // What is partly transparent is laid over the background: the corner is neither the one nor the other.
+        let corner = got.to_rgba8(art.palette()).data[0];
+        assert!(corner > 60 && corner < 200, "{corner}");
         assert!(!got.indices.contains(&art.palette().transparent()));
         let colors = got.to_rgba8(art.palette());
-        assert_eq!(colors.data[..4], [9, 9, 9, 255]);
+        assert_eq!(colors.data[4 * 14..][..4], [9, 9, 9, 255]);
     }
 }

@@ -4,7 +4,7 @@
 //! 89.8 KB and Up 107.2 KB. Rendered pictures stand still from row to row at both ends: where the pixels are those above, what
 //! Paeth leaves is zero, so that only what lies between is looked at.
 
-use super::delta::Rect;
+use super::delta::{Rect, span};
 use crate::image::Rgba8;
 
 /// A rectangle of a picture.
@@ -17,8 +17,6 @@ pub(super) struct Rows<'a> {
 
 /// Filtered bytes that are deflated at a time: they stay in the nearest cache.
 const BATCH: usize = 16 << 10;
-/// Pixels that are compared at a time.
-const WIDE: usize = 16;
 
 impl<'a> Rows<'a> {
     /// Part of a picture.
@@ -78,7 +76,7 @@ impl<'a> Rows<'a> {
         let mut differences = Vec::new();
         let mut filled = 0;
         for (y, row) in self.iter().enumerate() {
-            let (start, end) = changed(above, row);
+            let (start, end) = span(above, row).unwrap_or((width, width));
             // Below the first row, what stands still was looked at above.
             let fresh = if y == 0 { row } else { &row[start..end] };
             if CHANNELS == 3 && !is_opaque(fresh) {
@@ -108,19 +106,6 @@ impl<'a> Rows<'a> {
 
 fn is_opaque(pixels: &[[u8; 4]]) -> bool {
     pixels.chunks(1024).all(|part| part.iter().fold(255, |a, p| a & p[3]) == 255)
-}
-
-/// The columns outside of which two rows are equal.
-fn changed(above: &[[u8; 4]], row: &[[u8; 4]]) -> (usize, usize) {
-    let (a, b) = (above.as_chunks::<WIDE>().0, row.as_chunks::<WIDE>().0);
-    let same = a.iter().zip(b).take_while(|(a, b)| a == b).count() * WIDE;
-    let start = same + above[same..].iter().zip(&row[same..]).take_while(|(a, b)| a == b).count();
-    let (above, row) = (&above[start..], &row[start..]);
-    let (a, b) = (above.as_rchunks::<WIDE>().1, row.as_rchunks::<WIDE>().1);
-    let same = a.iter().rev().zip(b.iter().rev()).take_while(|(a, b)| a == b).count() * WIDE;
-    let left = row.len() - same;
-    let rest = above[..left].iter().rev().zip(row[..left].iter().rev()).take_while(|(a, b)| a == b).count();
-    (start, start + left - rest)
 }
 
 /// What Paeth's predictor leaves of the pixels `start..end`.
@@ -174,21 +159,6 @@ mod tests {
             let [_, a, b, c] = u32::to_be_bytes(i);
             let want = standard(a.into(), b.into(), c.into());
             assert_eq!(i32::from(predict(a, b, c)), want, "{a} {b} {c}");
-        }
-    }
-
-    #[test]
-    fn what_changed_is_found_at_any_column() {
-        for width in [1, 15, 16, 17, 70] {
-            let row = vec![[7; 4]; width];
-            assert_eq!(changed(&row, &row), (width, width));
-            for first in 0..width {
-                for last in [first, (first + 20).min(width - 1)] {
-                    let mut other = row.clone();
-                    (other[first], other[last]) = ([8; 4], [9; 4]);
-                    assert_eq!(changed(&row, &other), (first, last + 1), "{width}");
-                }
-            }
         }
     }
 }

@@ -1,27 +1,40 @@
-//! Triangles to pixels: a visibility buffer first, then shading once a pixel, eight pixels at a time.
+//! Triangles to pixels: a visibility buffer first, then shading once a pixel and surface, eight at a time.
 //!
 //! 1. `vertex`: each vertex to the picture plane, once, in 1/256 pixels.
 //! 2. `setup`: each triangle is culled, clipped, and put into the lists of the 64×64 tiles that it meets; triangles of a
 //!    few pixels become single samples there and then.
-//! 3. `tile`: each tile finds what is visible at each sample; `resolve` shades that and writes the colours.
+//! 3. `tile`: each tile finds what is visible at each sample (`fill`), lists it by triangle (`scan`), and shades that
+//!    (`resolve`); `colors` and `encode` write.
 //!
 //! Samples are decided in integers and ties by the order of submission, so the picture does not depend on the number of
 //! threads, on the vector instructions that the machine has, or on the order in which tiles are drawn.
+//!
+//! At four samples a pixel is shaded once for each surface in it and not for each triangle (`merge`); what is covered stays
+//! exact. A walking figure of 2,100 visible triangles in 30,000 pixels takes 30,000 evaluations then instead of 41,800.
+//!
+//! What else it is that makes it fast, with the share of the time that it saved on such a figure: samples of a pixel side by
+//! side, only touched 8×8 blocks cleared, read and encoded, pixels listed by triangle through the whole tile (together 25 %);
+//! texels decoded once, two and two in one load (`sample`, 15 %); no half vector and shorter chains of dependent operations in
+//! the shading equation (5 %).
 
 mod blend;
 mod channels;
 mod clip;
+mod colors;
 mod encode;
 mod fill;
 mod frame;
+mod merge;
 mod resolve;
+mod scan;
 mod setup;
 mod surface;
 mod tile;
 mod vertex;
+mod window;
 
-use super::Settings;
 use super::channel::{Channel, Channels};
+use super::{Settings, Window};
 use crate::image::{Image, Rgba8};
 use crate::math::simd::{self, Isa};
 use crate::scene::Scene;
@@ -29,6 +42,7 @@ use encode::Target;
 use frame::Frame;
 use setup::Bins;
 use tile::TileScratch;
+use window::View;
 
 /// Pixels along a tile's side.
 pub(crate) const TILE: usize = 64;
@@ -67,7 +81,7 @@ pub struct Stats {
     pub drawn: u64,
     /// Samples where something opaque is seen.
     pub samples: u64,
-    /// Evaluations of the shading equation.
+    /// Evaluations of the shading equation: one for each surface in a pixel, one for each layer of what blends.
     pub shaded: u64,
 }
 
@@ -114,6 +128,7 @@ impl std::ops::AddAssign for Stats {
 #[derive(Debug, Default)]
 pub struct Rasterizer {
     isa: Isa,
+    window: Option<Window>,
     vertices: vertex::Vertices,
     bins: Vec<Bins>,
     tiles: Vec<TileScratch>,
@@ -125,14 +140,24 @@ impl Rasterizer {
         Self { isa, ..Self::default() }
     }
 
+    /// Draw this part of pictures alone, or all of them again for `None`: `settings` go on to speak of the whole, outputs take the
+    /// window's size, and its pixels are the whole picture's, bit for bit. What of it lies outside the picture is left out.
+    pub fn set_window(&mut self, window: Option<Window>) {
+        self.window = window;
+    }
+
     /// Draw to 8-bit sRGB with straight alpha; `out` takes the size of `settings`.
     ///
     /// # Panics
     /// If `settings` do not pass [`Settings::check`].
     pub fn draw(&mut self, scene: &Scene, settings: &Settings, out: &mut Rgba8) -> Stats {
-        (out.width, out.height) = (settings.width, settings.height);
-        out.data.resize(4 * settings.width * settings.height, 0);
-        self.paint(scene, settings, encode::rgba8_bands(out))
+        let view = View::new(self.window, settings);
+        (out.width, out.height) = (view.tiles.width, view.tiles.height);
+        out.data.resize(4 * out.width * out.height, 0);
+        let stats = self.paint(scene, settings, view.tiles, encode::rgba8_bands(out));
+        view.cut(4, &mut out.data);
+        [out.width, out.height] = view.size();
+        stats
     }
 
     /// Draw to linear light with premultiplied alpha; `out` takes the size of `settings`.
@@ -140,9 +165,13 @@ impl Rasterizer {
     /// # Panics
     /// If `settings` do not pass [`Settings::check`].
     pub fn draw_linear(&mut self, scene: &Scene, settings: &Settings, out: &mut Image) -> Stats {
-        (out.width, out.height) = (settings.width, settings.height);
-        out.pixels.resize(settings.width * settings.height, [0.0; 4]);
-        self.paint(scene, settings, encode::linear_bands(out))
+        let view = View::new(self.window, settings);
+        (out.width, out.height) = (view.tiles.width, view.tiles.height);
+        out.pixels.resize(out.width * out.height, [0.0; 4]);
+        let stats = self.paint(scene, settings, view.tiles, encode::linear_bands(out));
+        view.cut(1, &mut out.pixels);
+        [out.width, out.height] = view.size();
+        stats
     }
 
     /// Draw what is where, at pixel centres; masks and transparency count as in a picture, but nothing that blends is
@@ -151,12 +180,19 @@ impl Rasterizer {
     /// # Panics
     /// If `settings` do not pass [`Settings::check`].
     pub fn draw_ids(&mut self, scene: &Scene, settings: &Settings, out: &mut IdImage) -> Stats {
-        let n = settings.width * settings.height;
-        (out.width, out.height) = (settings.width, settings.height);
+        let view = View::new(self.window, settings);
+        let n = view.tiles.width * view.tiles.height;
+        (out.width, out.height) = (view.tiles.width, view.tiles.height);
         out.objects.resize(n, 0);
         out.triangles.resize(n, 0);
         out.depth.resize(n, f32::INFINITY);
-        self.paint(scene, &Settings { samples: 1, ..*settings }, encode::id_bands(out))
+        let settings = Settings { samples: 1, ..*settings };
+        let stats = self.paint(scene, &settings, view.tiles, encode::id_bands(out));
+        view.cut(1, &mut out.objects);
+        view.cut(1, &mut out.triangles);
+        view.cut(1, &mut out.depth);
+        [out.width, out.height] = view.size();
+        stats
     }
 
     /// Draw what the pixels show beside their colour: the channels that are asked for, and objects always; nothing that
@@ -171,12 +207,18 @@ impl Rasterizer {
         wanted: &[Channel],
         out: &mut Channels,
     ) -> Stats {
-        out.reset(settings.width, settings.height, wanted);
-        self.paint(scene, settings, encode::channel_bands(out))
+        let view = View::new(self.window, settings);
+        out.reset(view.tiles.width, view.tiles.height, wanted);
+        let stats = self.paint(scene, settings, view.tiles, encode::channel_bands(out));
+        view.cut(1, &mut out.objects);
+        view.cut(1, &mut out.depth);
+        view.cut(1, &mut out.normals);
+        [out.width, out.height] = view.size();
+        stats
     }
 
-    /// All stages; `bands` are the rows of tiles of the output.
-    fn paint(&mut self, scene: &Scene, settings: &Settings, bands: Vec<Target>) -> Stats {
+    /// All stages; `bands` are the rows of tiles of the output, which shows the whole tiles `tiles`.
+    fn paint(&mut self, scene: &Scene, settings: &Settings, tiles: Window, bands: Vec<Target>) -> Stats {
         settings.check().expect("settings are checked by the caller");
         let frame = Frame::new(self.isa, scene, settings);
         let threads = settings.threads.max(1);
@@ -195,14 +237,14 @@ impl Rasterizer {
         // Draw the rows of tiles.
         self.tiles.resize_with(threads.max(self.tiles.len()), TileScratch::default);
         let bins = &self.bins[..threads];
-        let rows = std::sync::Mutex::new(bands.into_iter().enumerate());
+        let rows = std::sync::Mutex::new((tiles.y / TILE..).zip(bands));
         let workers: Vec<&mut TileScratch> = self.tiles[..threads].iter_mut().collect();
         each(workers, threads, |scratch| {
             scratch.stats = Stats::default();
             loop {
                 let next = rows.lock().expect("no worker panics").next();
                 let Some((row, mut target)) = next else { break };
-                simd::run(isa, tile::Row { frame: &frame, bins, row, scratch, target: &mut target });
+                simd::run(isa, tile::Row { frame: &frame, bins, row, tiles, scratch, target: &mut target });
             }
         });
         bins.iter().for_each(|b| stats += b.stats);
