@@ -13,6 +13,8 @@ mod corpus;
 mod deform;
 #[cfg(feature = "io")]
 mod gltf;
+#[cfg(feature = "cli")]
+mod golden;
 #[cfg(feature = "io")]
 mod looks;
 #[cfg(feature = "pictures")]

@@ -173,7 +173,7 @@ impl Stage {
             let below = near.texel_from_scene.transform_point3(self.bounds[0]).z;
             near.depth.iter_mut().for_each(|z| *z -= below);
             let strength = if look.shadows == Shadows::Map { 0.7 } else { 1.0 };
-            let parts = [[0.12 * r, 0.06 * r, 0.7 * strength], [0.7 * r, 0.25 * r, 0.6 * strength]];
+            let parts = [[0.12 * r, 0.035 * r, 0.8 * strength], [0.7 * r, 0.2 * r, 0.65 * strength]];
             contact.contact(near, &parts);
         }
         if look.shadows == Shadows::Map

@@ -51,9 +51,10 @@ impl Hsv {
         Self { hue_deg, saturation, value }
     }
 
-    /// The colour; hues of −360° and more are brought into 0…360° as `(h + 360) mod 360`.
+    /// The colour; hues of −360° and more that are not within 0…360° are brought there as `(h + 360) mod 360`.
     pub fn rgb(self) -> [f64; 3] {
-        let sixth = ((self.hue_deg + 360.0) % 360.0) / 60.0;
+        let inside = (0.0..360.0).contains(&self.hue_deg);
+        let sixth = if inside { self.hue_deg } else { (self.hue_deg + 360.0) % 360.0 } / 60.0;
         let chroma = self.value * self.saturation;
         let middle = chroma * (1.0 - (sixth % 2.0 - 1.0).abs());
         let color = match sixth as u8 {
@@ -69,7 +70,7 @@ impl Hsv {
     }
 }
 
-/// The colour with its hue turned by −300° or more.
+/// The colour with its hue turned by −300° or more, to `(h + degrees + 360) mod 360`.
 ///
 /// ```
 /// use sinew::image::hue::shift_hue;
@@ -77,7 +78,7 @@ impl Hsv {
 /// ```
 pub fn shift_hue(color: [f64; 3], degrees: f64) -> [f64; 3] {
     let hsv = Hsv::of(color);
-    Hsv { hue_deg: hsv.hue_deg + degrees, ..hsv }.rgb()
+    Hsv { hue_deg: (hsv.hue_deg + degrees + 360.0) % 360.0, ..hsv }.rgb()
 }
 
 /// The colour with less saturation, `S(1 − amount)`: nothing happens at 0, grays are left at 1.

@@ -272,6 +272,12 @@ impl I8 {
         low | high << 4
     }
 
+    /// All signs set.
+    #[inline(always)]
+    pub fn all(self) -> bool {
+        self.bitmask() == 0xff
+    }
+
     /// Any sign set.
     #[inline(always)]
     pub fn any(self) -> bool {
@@ -369,10 +375,9 @@ pub fn log2(x: F8) -> F8 {
     let s = (m + -1.0) / (m + 1.0);
     let s2 = s * s;
     let k = 2.0 * std::f32::consts::LOG2_E;
-    let p = F8::splat(k / 9.0) * s2 + k / 7.0;
-    let p = p * s2 + k / 5.0;
-    let p = p * s2 + k / 3.0;
-    let p = p * s2 + k;
+    // Pairs of terms first (Estrin 1960): the chain of dependent operations is half as long as Horner's.
+    let s4 = s2 * s2;
+    let p = (s2 * (k / 3.0) + k) + (s2 * (k / 7.0) + k / 5.0) * s4 + s4 * s4 * (k / 9.0);
     e.to_f32() + p * s
 }
 
@@ -384,12 +389,9 @@ pub fn exp2(x: F8) -> F8 {
     let x = x.max(F8::splat(-126.0)).min(F8::splat(127.0));
     let n = x.round();
     let f = (x - n.to_f32()) * std::f32::consts::LN_2;
-    let p = f * (1.0 / 720.0) + 1.0 / 120.0;
-    let p = p * f + 1.0 / 24.0;
-    let p = p * f + 1.0 / 6.0;
-    let p = p * f + 0.5;
-    let p = p * f + 1.0;
-    let p = p * f + 1.0;
+    let f2 = f * f;
+    let tail = (f * (1.0 / 120.0) + 1.0 / 24.0) + f2 * (1.0 / 720.0);
+    let p = (f + 1.0) + ((f * (1.0 / 6.0) + 0.5) + f2 * tail) * f2;
     p * (n + I8::splat(127)).shift_left(23).from_bits()
 }
 
@@ -415,7 +417,7 @@ pub trait Kernel {
 /// Which build of a kernel runs; the results are the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Isa {
-    /// AVX2 where the machine has it.
+    /// AVX2 where the machine has it. (AVX-512 gives the same bits and takes the same time: the kernels are eight wide.)
     #[default]
     Best,
     /// What every machine of the target has.

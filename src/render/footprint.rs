@@ -114,33 +114,34 @@ impl Footprint {
 
 /// Means of `2n+1` neighbours along rows; beyond the edge is nothing.
 fn rows(from: &[f32], size: usize, n: usize, to: &mut Vec<f32>) {
-    let scale = 1.0 / (2 * n + 1) as f32;
+    let scale = 1.0 / (2 * n + 1) as f64;
     to.clear();
     for row in from.chunks_exact(size) {
-        let mut sum: f32 = row[..n.min(size)].iter().sum();
+        // In f64, so that what comes in leaves nothing behind when it goes out.
+        let mut sum: f64 = row[..n.min(size)].iter().map(|v| f64::from(*v)).sum();
         for x in 0..size {
-            sum += row.get(x + n).unwrap_or(&0.0);
-            to.push((sum * scale).clamp(0.0, 1.0));
-            sum -= if x >= n { row[x - n] } else { 0.0 };
+            sum += row.get(x + n).map_or(0.0, |v| f64::from(*v));
+            to.push((sum * scale) as f32);
+            sum -= if x >= n { f64::from(row[x - n]) } else { 0.0 };
         }
     }
 }
 
 /// The same along columns, a whole row of sums at a time.
 fn columns(from: &[f32], size: usize, n: usize, to: &mut Vec<f32>) {
-    let scale = 1.0 / (2 * n + 1) as f32;
+    let scale = 1.0 / (2 * n + 1) as f64;
     to.clear();
-    let mut sums = vec![0.0; size];
+    let mut sums = vec![0.0_f64; size];
     let row = |y: usize| &from[y * size..][..size];
-    let add = |sums: &mut [f32], y: usize| sums.iter_mut().zip(row(y)).for_each(|(s, v)| *s += v);
+    let add = |sums: &mut [f64], y: usize| sums.iter_mut().zip(row(y)).for_each(|(s, v)| *s += f64::from(*v));
     (0..n.min(size)).for_each(|y| add(&mut sums, y));
     for y in 0..size {
         if y + n < size {
             add(&mut sums, y + n);
         }
-        to.extend(sums.iter().map(|s| (s * scale).clamp(0.0, 1.0)));
+        to.extend(sums.iter().map(|s| (s * scale) as f32));
         if y >= n {
-            sums.iter_mut().zip(row(y - n)).for_each(|(s, v)| *s -= v);
+            sums.iter_mut().zip(row(y - n)).for_each(|(s, v)| *s -= f64::from(*v));
         }
     }
 }

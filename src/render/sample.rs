@@ -2,6 +2,7 @@
 
 use crate::image::color::LINEAR_OF_SRGB8;
 use crate::math::simd::{self, F8, I8, Isa, Kernel};
+use crate::scene::texels::{Level, PACKED};
 use crate::scene::{Filter, Texture, WrapMode};
 use std::sync::LazyLock;
 
@@ -47,22 +48,30 @@ impl Kernel for Lookup<'_> {
 #[inline(always)]
 fn filtered(t: &Texture, uv: &Uv) -> [F8; 4] {
     let top = (t.levels().len() - 1) as f32;
-    let lod = lod(t, uv).max(F8::ZERO).min(F8::splat(top));
+    let lod = if top > 0.0 { lod(t, uv).max(F8::ZERO).min(F8::splat(top)) } else { F8::ZERO };
     if t.filter() == Filter::Nearest {
         return nearest(t, uv, lod.round());
     }
     let level = lod.floor();
-    let fine = bilinear(t, uv, level);
     let fraction = lod - level.to_f32();
-    if fraction.gt(F8::ZERO).bitmask() == 0 {
-        return fine;
+    let next = (level + I8::splat(1)).min(I8::splat(top as i32));
+    let blended = fraction.gt(F8::ZERO).any();
+    let mut sum = [F8::ZERO; 4];
+    if matches!(t.texels(level.0[0] as usize), Level::Packed(_)) {
+        add_packed(t, uv, level, F8::ONE - fraction, &mut sum);
+        if blended {
+            add_packed(t, uv, next, fraction, &mut sum);
+        }
+        for c in 0..3 {
+            sum[c] = sum[c] * (1.0 / (PACKED[c] * PACKED[c]));
+        }
+        return [sum[0], sum[1], sum[2], F8::ONE];
     }
-    let coarse = bilinear(t, uv, (level + I8::splat(1)).min(I8::splat(top as i32)));
-    let mut out = fine;
-    for c in 0..4 {
-        out[c] = fine[c] + (coarse[c] - fine[c]) * fraction;
+    add_wide(t, uv, level, F8::ONE - fraction, &mut sum);
+    if blended {
+        add_wide(t, uv, next, fraction, &mut sum);
     }
-    out
+    sum
 }
 
 #[inline(always)]
@@ -99,17 +108,6 @@ fn wrapped(x: F8, mode: WrapMode) -> F8 {
         }
         WrapMode::Clamp => x.clamp01(),
     }
-}
-
-/// A texel index back into the level.
-#[inline(always)]
-fn within(i: I8, size: I8, mode: WrapMode) -> I8 {
-    let last = size - I8::splat(1);
-    if mode == WrapMode::Repeat {
-        let up = I8::ZERO.gt(i).select_int(i + size, i);
-        return up.gt(last).select_int(up - size, up).max(I8::ZERO).min(last);
-    }
-    i.max(I8::ZERO).min(last)
 }
 
 /// Texels by lane, as little-endian RGBA words.
@@ -154,32 +152,93 @@ fn table(t: &Texture) -> &'static [f32; 256] {
 fn nearest(t: &Texture, uv: &Uv, level: I8) -> [F8; 4] {
     let (w, h) = (size(t.width(), level), size(t.height(), level));
     let [wrap_u, wrap_v] = t.wrap();
-    let x = within((wrapped(uv.u, wrap_u) * w.to_f32()).floor(), w, WrapMode::Clamp);
-    let y = within((wrapped(uv.v, wrap_v) * h.to_f32()).floor(), h, WrapMode::Clamp);
+    let index = |x: F8, size: I8| (x * size.to_f32()).floor().max(I8::ZERO).min(size - I8::splat(1));
+    let (x, y) = (index(wrapped(uv.u, wrap_u), w), index(wrapped(uv.v, wrap_v), h));
     let mut sum = [F8::ZERO; 4];
     add(&mut sum, fetch(t, level, y * w + x), F8::ONE, table(t));
     sum
 }
 
-/// Four texels around each point, whose centres are at half-integers.
+/// The two texels on either side of a point along an axis, the weight of the second; centres are at half-integers.
 #[inline(always)]
-fn bilinear(t: &Texture, uv: &Uv, level: I8) -> [F8; 4] {
+fn neighbours(x: F8, size: I8, mode: WrapMode) -> (I8, I8, F8) {
+    let x = wrapped(x, mode) * size.to_f32() + -0.5;
+    let last = size - I8::splat(1);
+    if mode != WrapMode::Repeat {
+        let x = x.max(F8::ZERO).min(last.to_f32());
+        let first = x.floor();
+        return (first, (first + I8::splat(1)).min(last), x - first.to_f32());
+    }
+    let first = x.floor();
+    let fraction = x - first.to_f32();
+    let first = I8::ZERO.gt(first).select_int(last, first).min(last);
+    let second = first.equal(last).select_int(I8::ZERO, first + I8::splat(1));
+    (first, second, fraction)
+}
+
+/// Where the four texels around each point are: the first of two in the upper row and in the lower, and the weights of all.
+#[inline(always)]
+fn around(t: &Texture, uv: &Uv, level: I8, weight: F8) -> ([I8; 2], [[F8; 2]; 2]) {
     let (w, h) = (size(t.width(), level), size(t.height(), level));
     let [wrap_u, wrap_v] = t.wrap();
-    let x = wrapped(uv.u, wrap_u) * w.to_f32() + -0.5;
-    let y = wrapped(uv.v, wrap_v) * h.to_f32() + -0.5;
-    let (x0, y0) = (x.floor(), y.floor());
-    let (fx, fy) = (x - x0.to_f32(), y - y0.to_f32());
-    let one = I8::splat(1);
-    let columns = [within(x0, w, wrap_u), within(x0 + one, w, wrap_u)];
-    let rows = [within(y0, h, wrap_v) * w, within(y0 + one, h, wrap_v) * w];
-    let (wx, wy) = ([F8::ONE - fx, fx], [F8::ONE - fy, fy]);
-    let table = table(t);
-    let mut sum = [F8::ZERO; 4];
+    let (x, _, fx) = neighbours(uv.u, w, wrap_u);
+    let (y0, y1, fy) = neighbours(uv.v, h, wrap_v);
+    let stride = w + I8::splat(1);
+    let (upper, lower) = ((F8::ONE - fy) * weight, fy * weight);
+    let left = F8::ONE - fx;
+    ([y0 * stride + x, y1 * stride + x], [[upper * left, upper * fx], [lower * left, lower * fx]])
+}
+
+/// Add `weight` times the four texels around each point, in squares of packed values.
+///
+/// A channel is decoded by one product, and a level takes half the memory of one in linear light, which matters most: texels
+/// come from far away.
+#[inline(always)]
+fn add_packed(t: &Texture, uv: &Uv, level: I8, weight: F8, sum: &mut [F8; 4]) {
+    let (at, weights) = around(t, uv, level, weight);
+    let mut levels: [&[u32]; 8] = [&[]; 8];
+    let same = level == I8::splat(level.0[0]);
+    for k in 0..8 {
+        levels[k] = match t.texels(level.0[if same { 0 } else { k }] as usize) {
+            Level::Packed(texels) => texels,
+            Level::Wide(_) => &[],
+        };
+    }
     for j in 0..2 {
-        for i in 0..2 {
-            add(&mut sum, fetch(t, level, rows[j] + columns[i]), wx[i] * wy[j], table);
+        let (mut left, mut right) = (I8::ZERO, I8::ZERO);
+        for k in 0..8 {
+            let pair = &levels[k][at[j].0[k] as usize..][..2];
+            (left.0[k], right.0[k]) = (pair[0] as i32, pair[1] as i32);
+        }
+        add_squares(sum, left, weights[j][0]);
+        add_squares(sum, right, weights[j][1]);
+    }
+}
+
+#[inline(always)]
+fn add_squares(sum: &mut [F8; 4], texel: I8, weight: F8) {
+    let low = I8::splat(2047);
+    let r = (texel & low).to_f32();
+    let g = (texel.shift_right(11) & low).to_f32();
+    let b = (texel.shift_right(22) & I8::splat(1023)).to_f32();
+    sum[0] = sum[0] + r * r * weight;
+    sum[1] = sum[1] + g * g * weight;
+    sum[2] = sum[2] + b * b * weight;
+}
+
+/// Add `weight` times the four texels around each point.
+///
+/// Each lane takes the two texels of a row in one load, all channels side by side.
+#[inline(always)]
+fn add_wide(t: &Texture, uv: &Uv, level: I8, weight: F8, sum: &mut [F8; 4]) {
+    let (at, weights) = around(t, uv, level, weight * (1.0 / 65535.0));
+    for k in 0..8 {
+        let Level::Wide(texels) = t.texels(level.0[k] as usize) else { return };
+        let row = |j: usize| &texels[4 * at[j].0[k] as usize..][..8];
+        let (upper, lower) = (row(0), row(1));
+        for c in 0..4 {
+            let mean = |row: &[u16], w: &[F8; 2]| row[c] as f32 * w[0].0[k] + row[c + 4] as f32 * w[1].0[k];
+            sum[c].0[k] += mean(upper, &weights[0]) + mean(lower, &weights[1]);
         }
     }
-    sum
 }

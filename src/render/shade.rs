@@ -71,6 +71,9 @@ fn from_point(lamp: Vec3, falloff: Option<f32>, position: V8) -> (V8, F8) {
 
 /// `k_d max(0, n·l) + k_s max(0, n·h)^p` for unit `n`, `l` and `v`, with `h = (v+l)/‖v+l‖`; nothing where `n·l ≤ 0`
 /// (notes §3.4–3.6).
+///
+/// `(n·h)² = (n·v + n·l)² / (2 + 2 v·l)`, so the half vector is never made: its power is taken to `p/2`, and a square root and
+/// two thirds of the products are saved.
 #[inline(always)]
 pub(crate) fn reflected(s: &Surface, towards: V8) -> V8 {
     let n_l = s.normal.dot(towards);
@@ -78,9 +81,14 @@ pub(crate) fn reflected(s: &Surface, towards: V8) -> V8 {
     if !lit.any() {
         return V8::ZERO;
     }
-    let half = (s.view + towards).unit();
-    let n_h = s.normal.dot(half).max(F8::ZERO).min(F8::ONE);
-    let sum = s.diffuse * n_l + s.specular * simd::pow(n_h, s.shininess);
+    let shiny = s.specular.x.gt(F8::ZERO) | s.specular.y.gt(F8::ZERO) | s.specular.z.gt(F8::ZERO);
+    if !shiny.any() {
+        return V8::select(lit, s.diffuse * n_l, V8::ZERO);
+    }
+    let sum = (s.normal.dot(s.view) + n_l).max(F8::ZERO);
+    let length = (s.view.dot(towards) + 1.0) * 2.0;
+    let cos2 = (sum * sum / length.max(F8::splat(1e-6))).min(F8::ONE);
+    let sum = s.diffuse * n_l + s.specular * simd::pow(cos2, s.shininess * 0.5);
     V8::select(lit, sum, V8::ZERO)
 }
 

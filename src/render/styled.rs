@@ -139,19 +139,22 @@ fn share(map: &ShadowMap, x: f32, y: f32, z: f32) -> f32 {
     }
     let (x0, y0) = ((x - r).floor(), (y - r).floor());
     let taps = (2.0 * r).ceil() as usize + 1;
-    let mut sum = 0.0;
+    // The weights are summed as the light is, so that nothing dark in reach gives exactly 1.
+    let (mut sum, mut whole) = (0.0, 0.0);
     for j in 0..taps {
         let top = y0 + j as f32;
-        let high = (y + r).min(top + 1.0) - (y - r).max(top);
+        let high = ((y + r).min(top + 1.0) - (y - r).max(top)).max(0.0);
         let row = (top as usize).min(map.size - 1) * map.size;
-        let mut lit = 0.0;
+        let (mut lit, mut all) = (0.0, 0.0);
         for i in 0..taps {
             let left = x0 + i as f32;
             let wide = ((x + r).min(left + 1.0) - (x - r).max(left)).max(0.0);
             let open = map.depth[row + (left as usize).min(map.size - 1)] >= z;
             lit += if open { wide } else { 0.0 };
+            all += wide;
         }
-        sum += high.max(0.0) * lit;
+        sum += high * lit;
+        whole += high * all;
     }
-    sum / (4.0 * r * r)
+    sum / whole
 }

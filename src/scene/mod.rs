@@ -8,6 +8,7 @@ mod mips;
 mod patch;
 mod shadow;
 mod style;
+pub(crate) mod texels;
 mod texture;
 
 pub use camera::{Camera, CameraError, Projection};

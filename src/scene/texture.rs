@@ -1,5 +1,7 @@
 //! Textures: decoded pixels, how they repeat and how they are filtered.
 
+use super::texels::{Level, Texels};
+
 /// A texture's place in the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct TextureId(pub u32);
@@ -46,6 +48,8 @@ pub struct Texture {
     wrap: [WrapMode; 2],
     filter: Filter,
     levels: Vec<Vec<u8>>,
+    /// The same for filters, made when they are first needed.
+    texels: Texels,
 }
 
 /// Pixels that make no texture.
@@ -79,8 +83,10 @@ impl Texture {
         if expected == 0 || rgba.len() as u64 != expected {
             return Err(TextureError { width, height, expected, found: rgba.len() as u64 });
         }
+        let opaque = rgba.chunks(4096).all(|c| c.as_chunks::<4>().0.iter().fold(255, |a, t| a & t[3]) == 255);
         let levels = super::mips::chain(width, height, rgba, content);
-        Ok(Self { width, height, content, wrap, filter, levels })
+        let texels = Texels::new(levels.len(), opaque && content != Content::Numbers);
+        Ok(Self { width, height, content, wrap, filter, levels, texels })
     }
 
     /// Pixels a row of the finest level.
@@ -111,5 +117,14 @@ impl Texture {
     /// RGBA bytes of a level; 0 is the finest, each next one half as large.
     pub fn levels(&self) -> &[Vec<u8>] {
         &self.levels
+    }
+
+    /// A level for filters.
+    #[inline(always)]
+    pub(crate) fn texels(&self, level: usize) -> &Level {
+        self.texels.get(level, self.srgb(), || {
+            let w = (self.width >> level).max(1) as usize;
+            (&self.levels[level], w, self.wrap[0] == WrapMode::Repeat)
+        })
     }
 }

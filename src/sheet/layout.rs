@@ -162,6 +162,8 @@ pub fn grid(
 pub fn pack(sizes: &[[usize; 2]], packing: Packing) -> Result<Layout, SheetError> {
     check_sizes(sizes)?;
     let Packing { margins, power_of_two, limits } = packing;
+    // Areas of any sides up to here fit a machine word.
+    let limits = Limits { side: limits.side.min(1 << 24), ..limits };
     if sizes.len() > MOST_PACKED {
         return Err(SheetError::TooMany { found: sizes.len(), limit: MOST_PACKED });
     }
@@ -243,6 +245,6 @@ fn check_sizes(sizes: &[[usize; 2]]) -> Result<(), SheetError> {
 }
 
 fn check(frames: usize, [width, height]: [usize; 2], limits: Limits) -> Result<(), SheetError> {
-    let fits = width <= limits.side && height <= limits.side && width * height <= limits.pixels;
+    let fits = width <= limits.side && height <= limits.side && width.saturating_mul(height) <= limits.pixels;
     if fits { Ok(()) } else { Err(SheetError::TooLarge { frames, width, height, limits }) }
 }

@@ -160,3 +160,97 @@ fn transparent_neighbours_leave_no_seam() {
         assert!(stage.linear(32, 4).0.pixels.iter().all(|p| *p == [0.5; 4]));
     }
 }
+
+/// A bumpy ball of about `n` triangles, whole or cut into one object a triangle.
+fn ball(n: usize, cut: bool) -> Stage {
+    let v = (n as f32 / 4.0).sqrt() as u32;
+    let row = 2 * v + 1;
+    let mut data = MeshData::default();
+    for k in 0..(v + 1) * row {
+        let pi = std::f32::consts::PI;
+        let ((s, c), (sp, cp)) =
+            ((pi * (k / row) as f32 / v as f32).sin_cos(), (pi * (k % row) as f32 / v as f32).sin_cos());
+        let d = Vec3::new(s * cp, c, s * sp);
+        data.positions.push(d * (1.0 + 0.1 * (7.0 * d.x).sin() * (9.0 * d.y).sin()));
+        data.normals.push(d);
+    }
+    for a in (0..v).flat_map(|j| (0..2 * v).map(move |i| j * row + i)) {
+        data.triangles.extend([[a, a + 1, a + row], [a + 1, a + row + 1, a + row]]);
+    }
+    let alone = |t: &[u32; 3]| MeshData {
+        positions: t.map(|v| data.positions[v as usize]).to_vec(),
+        normals: t.map(|v| data.normals[v as usize]).to_vec(),
+        triangles: vec![[0, 1, 2]],
+        ..Default::default()
+    };
+    let parts = if cut { data.triangles.iter().map(alone).collect() } else { vec![data.clone()] };
+    let mut stage = plate(vec![point(Vec3::new(2.0, 3.0, 4.0), None)]);
+    stage.camera = perspective(Vec3::Z * 4.0, Vec3::ZERO, 0.6);
+    stage.meshes = parts.into_iter().map(|d| (Mesh::new(d).unwrap(), 0)).collect();
+    stage
+}
+
+#[test]
+fn a_pixel_of_one_surface_is_shaded_once_and_looks_as_if_every_triangle_were() {
+    // From triangles of some pixels to several in one; objects never join, so the cut ball shades every triangle.
+    for (n, size, worst) in [(600, 96, 4), (2400, 96, 5), (9600, 64, 6)] {
+        let (once, each) = (ball(n, false).bytes(size, 4), ball(n, true).bytes(size, 4));
+        assert_eq!(once.1.samples, each.1.samples);
+        let alpha = |p: &Rgba8| p.data.chunks(4).map(|p| p[3]).collect::<Vec<_>>();
+        assert_eq!(alpha(&once.0), alpha(&each.0), "what is covered stays exact");
+
+        // A little more than one evaluation a pixel is left, for outlines.
+        let pixels = once.0.data.chunks(4).filter(|p| p[3] > 0).count() as f64;
+        let (few, many) = (once.1.shaded as f64 / pixels, each.1.shaded as f64 / pixels);
+        assert!(few < 1.06 && many > 1.25, "{n}: {few} {many}");
+
+        let off: Vec<f64> =
+            once.0.data.iter().zip(&each.0.data).map(|(a, b)| a.abs_diff(*b) as f64).collect();
+        let mean = off.iter().map(|d| d * d).sum::<f64>() / (3.0 * pixels);
+        let psnr = 10.0 * (255.0 * 255.0 / mean).log10();
+        let most = off.iter().fold(0.0, |a: f64, b| a.max(*b));
+        assert!(psnr > 50.0 && most <= worst as f64, "{n}: {psnr} dB, {most} codes");
+    }
+}
+
+#[test]
+fn creases_and_flat_faces_keep_a_colour_for_each_side() {
+    // A ridge seen from above, its sides with normals of their own; half of the middle column shows either.
+    let p = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);
+    let ridge = |normals: bool| MeshData {
+        positions: vec![
+            p(-2.0, -2.0, -1.0),
+            p(0.05, -2.0, 0.0),
+            p(0.05, 2.0, 0.0),
+            p(-2.0, 2.0, -1.0),
+            p(0.05, -2.0, 0.0),
+            p(2.0, -2.0, -1.0),
+            p(2.0, 2.0, -1.0),
+            p(0.05, 2.0, 0.0),
+        ],
+        normals: if normals {
+            [p(-0.6, 0.0, 0.8), p(0.6, 0.0, 0.8)].into_iter().flat_map(|n| [n; 4]).collect()
+        } else {
+            vec![]
+        },
+        triangles: vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]],
+        ..Default::default()
+    };
+    for normals in [true, false] {
+        let sun = Light {
+            kind: LightKind::Directional { direction: Vec3::new(1.0, 0.0, -1.0).normalize() },
+            color: Vec3::ONE,
+        };
+        let mut stage = plate(vec![sun]);
+        stage.materials[0].specular = Vec3::ZERO;
+        stage.camera = from_front(5.0, 2.0);
+        stage.meshes[0].0 = Mesh::new(ridge(normals)).unwrap();
+        let (picture, _) = stage.linear(9, 4);
+        let row: Vec<f32> = (0..9).map(|x| picture.pixels[4 * 9 + x][0]).collect();
+        let share = (row[4] - row[5]) / (row[3] - row[5]);
+        assert!(
+            row[3] > row[5] + 0.1 && [0.25, 0.5, 0.75].iter().any(|s| (share - s).abs() < 1e-3),
+            "{row:?}"
+        );
+    }
+}

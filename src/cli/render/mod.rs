@@ -33,7 +33,7 @@ Examples:
   sinew render fox.glb -o side.apng --camera yaw=90,pitch=5,fov=20
   sinew render rigs/pip.json -o pip-sheet.png --sheet trimmed --directions 8 --camera pitch=30,yaw=0,ortho --size 128 --fps 12
   sinew render fox.glb -o fox-sheet.png --sheet grid --maps normal,depth,id --sheet-json aseprite --size 128
-  sinew render fox.glb -o fox.gif --pixel-art --pixel-scale 4 --size 256 --colors 16 --outline
+  sinew render fox.glb -o fox.gif --pixel-art --pixel-scale 4 --size 256 --colors 16 --pixel-outline
   sinew render fox.glb -o fox-contact.png --contact 6x4 --size 160
   sinew render fox.glb -o icon.png --camera isometric --background transparent
   sinew render rigs/fox.json -o round.gif --turntable

@@ -190,7 +190,9 @@ fn decode_all(jobs: &[Job]) -> Vec<Decoded> {
         }
     };
     let count = jobs.iter().flatten().count();
-    let threads = std::thread::available_parallelism().map_or(1, |n| n.get()).min(count);
+    // Asking for the processors costs as much as decoding an icon.
+    let threads =
+        if count > 1 { std::thread::available_parallelism().map_or(1, |n| n.get()).min(count) } else { 1 };
     std::thread::scope(|s| {
         (1..threads).for_each(|_| drop(s.spawn(work)));
         work();

@@ -53,7 +53,7 @@ impl Rect {
 }
 
 /// Pixels that are compared at a time.
-const WIDE: usize = 16;
+const WIDE: usize = 32;
 
 /// Whether some pixels are those. A comparison of slices would call the system's, which for so few costs more than it does.
 #[inline(always)]

@@ -1,11 +1,13 @@
 //! Transparent triangles: sample by sample over what lies behind them, from back to front.
 
 use super::TILE;
-use super::fill::Walk;
+use super::fill::{Visitor, Walk, lane_pixels};
 use super::frame::Frame;
 use super::resolve::{self, Area};
+use super::scan::WHOLE;
 use super::setup::{Bins, Setup, bits};
 use super::tile::TileScratch;
+use crate::math::simd::{F8, I8};
 
 /// Layers held at once; within so many, pixels are sorted exactly, beyond by whole triangles.
 const HELD: usize = 1 << 16;
@@ -24,7 +26,7 @@ pub(super) struct Layer {
 #[derive(Debug, Default)]
 pub(super) struct BlendScratch {
     layers: Vec<Layer>,
-    colors: Vec<[f32; 4]>,
+    shades: Vec<[f32; 4]>,
     order: Vec<u32>,
     mask: Vec<u8>,
 }
@@ -58,17 +60,9 @@ pub(super) fn blend(frame: &Frame, bins: &[Bins], tile: usize, area: Area, scrat
 #[inline(always)]
 fn gather(frame: &Frame, walk: &Walk, scratch: &mut TileScratch) {
     let TileScratch { seen, blend, .. } = scratch;
+    seen.touch(walk.x, walk.y);
     let mask = &mut blend.mask;
-    walk.visit(frame.samples, |at, n, inside, z| {
-        let (from, bit) = (n * TILE * TILE + at, if frame.samples == 1 { resolve::WHOLE } else { 1 << n });
-        for k in bits(inside.bitmask()) {
-            let k = k as usize;
-            // What lies exactly on an opaque surface, a decal, is before it.
-            if z.0[k] >= seen.z[from + k] {
-                mask[at + k] |= bit;
-            }
-        }
-    });
+    walk.visit(frame.samples, &mut Gather { z: &seen.z, mask, samples: frame.samples });
     for y in walk.y[0]..=walk.y[1] {
         for x in walk.x[0]..=walk.x[1] {
             let at = y as usize * TILE + x as usize;
@@ -81,13 +75,35 @@ fn gather(frame: &Frame, walk: &Walk, scratch: &mut TileScratch) {
     }
 }
 
+/// Collects the samples that lie before everything opaque.
+struct Gather<'a> {
+    z: &'a [f32],
+    mask: &'a mut [u8],
+    samples: usize,
+}
+
+impl Visitor for Gather<'_> {
+    #[inline(always)]
+    fn see(&mut self, at: usize, inside: I8, z: F8) {
+        let pixels = lane_pixels(self.samples);
+        for k in bits(inside.bitmask()) {
+            let k = k as usize;
+            // What lies exactly on an opaque surface, a decal, is before it.
+            if z.0[k] >= self.z[at + k] {
+                let bit = if self.samples == 1 { WHOLE as u8 } else { 1 << (k % 4) };
+                self.mask[at / self.samples + pixels.0[k] as usize] |= bit;
+            }
+        }
+    }
+}
+
 /// Shade the layers that are held and put them over the picture.
 #[inline(always)]
 fn flush(frame: &Frame, area: Area, scratch: &mut TileScratch) {
-    let TileScratch { blend, planes, stats, .. } = scratch;
-    let BlendScratch { layers, colors, order, .. } = blend;
-    colors.clear();
-    resolve::shade_list(frame, area, layers, colors, stats);
+    let TileScratch { blend, colors, stats, .. } = scratch;
+    let BlendScratch { layers, shades, order, .. } = blend;
+    shades.clear();
+    resolve::shade_list(frame, area, layers, shades, stats);
     order.clear();
     order.extend(0..layers.len() as u32);
     order.sort_by(|&a, &b| {
@@ -95,12 +111,12 @@ fn flush(frame: &Frame, area: Area, scratch: &mut TileScratch) {
         a.place.cmp(&b.place).then(a.z.total_cmp(&b.z)).then(a.id.cmp(&b.id))
     });
     for &i in order.iter() {
-        let (layer, color) = (&layers[i as usize], colors[i as usize]);
-        let samples = if planes.by_sample { layer.mask as u32 } else { 1 };
+        let (layer, color) = (&layers[i as usize], shades[i as usize]);
+        let samples = if frame.samples == 4 { layer.mask as u32 } else { 1 };
         for s in bits(samples) {
             let at = s as usize * TILE * TILE + layer.place as usize;
             for c in 0..4 {
-                let p = &mut planes.c[c][at];
+                let p = &mut colors.planes[c][at];
                 *p = color[c] + *p * (1.0 - color[3]);
             }
         }

@@ -3,11 +3,12 @@
 use super::TILE;
 use super::fill::{NONE, Visibility};
 use super::frame::Frame;
-use super::resolve::{Area, CENTROIDS, WHOLE};
-use super::surface::Shade;
+use super::resolve::{Area, CENTROIDS};
+use super::scan::WHOLE;
+use super::surface::Normals;
 use crate::math::simd::F8;
 use crate::render::channel::Channels;
-use glam::{Mat3A, Vec3, Vec4};
+use glam::{Mat3A, Vec3};
 
 /// 64 rows of channels; planes that nobody asked for are empty.
 pub(super) struct Band<'a> {
@@ -77,13 +78,12 @@ impl Band<'_> {
         // Object, samples and least distance of each draw in the pixel.
         let mut held = [(usize::MAX, 0u32, f32::INFINITY); 4];
         let samples = frame.samples.min(4);
-        let ids: [u32; 4] =
-            std::array::from_fn(|s| if s < samples { seen.id[s * TILE * TILE + place] } else { NONE });
+        let ids: [u32; 4] = std::array::from_fn(|s| if s < samples { seen.look(place, s).0 } else { NONE });
         let mut draws = [usize::MAX; 4];
         for s in (0..samples).filter(|&s| ids[s] != NONE) {
             let d = if s > 0 && ids[s] == ids[s - 1] { draws[s - 1] } else { frame.draw_of(ids[s]) };
             draws[s] = d;
-            let distance = frame.distance(seen.z[s * TILE * TILE + place]);
+            let distance = frame.distance(seen.look(place, s).1);
             if let Some(h) = held.iter_mut().find(|h| h.0 == d || h.1 == 0) {
                 *h = (d, h.1 + 1, h.2.min(distance));
             }
@@ -110,7 +110,7 @@ impl Band<'_> {
             let mask = (s..samples).filter(|&t| ids[t] == ids[s]).fold(0u8, |m, t| m | 1 << t);
             if done & mask == 0 {
                 // A lone sample stands at the pixel's centre, as the mean of four does.
-                let mask = if samples == 1 { WHOLE } else { mask };
+                let mask = if samples == 1 { WHOLE as u8 } else { mask };
                 self.entries.push(Entry { place, id: ids[s], mask });
             }
             done |= mask;
@@ -134,7 +134,7 @@ impl Band<'_> {
                 px.0[k] = left + (e.place % TILE) as f32 + c[0];
                 py.0[k] = top + (e.place / TILE) as f32 + c[1];
             }
-            let normals = Shade::<false> { frame, draw, ids: &ids, known: &[Vec4::ZERO; 3], px, py }.normal();
+            let normals = Normals { frame, draw, ids: &ids, px, py }.find();
             for (k, e) in rest[..n].iter().enumerate() {
                 let normal = Vec3::new(normals.x.0[k], normals.y.0[k], normals.z.0[k]);
                 let at = self.at(area, e.place);

@@ -30,6 +30,8 @@ pub(super) struct Draw<'a> {
     pub class: Class,
     /// Triangles seen from behind are left out.
     pub cull: bool,
+    /// What shading reads is continuous where triangles share a vertex.
+    pub continuous: bool,
 }
 
 /// Rows of `picture_from_scene`: homogeneous pixels relative to the picture's centre, y down, and depth.
@@ -53,6 +55,8 @@ pub(super) struct Frame<'a> {
     pub samples: usize,
     pub vertex_count: usize,
     pub triangle_count: u32,
+    /// How much depth may differ within a smooth surface and a pixel.
+    pub depth_step: [f32; 2],
     pub stats: Stats,
 }
 
@@ -85,6 +89,7 @@ impl<'a> Frame<'a> {
             samples: settings.samples as usize,
             vertex_count: 0,
             triangle_count: 0,
+            depth_step: super::merge::depth_step(h, &scene.camera),
             stats: Stats::default(),
         };
         for (index, object) in scene.objects.iter().enumerate() {
@@ -117,6 +122,7 @@ impl<'a> Frame<'a> {
                 AlphaMode::Blend => Class::Blend,
             },
             cull: !material.double_sided,
+            continuous: material.unlit || !object.normals.is_empty(),
         });
         self.triangle_count = end as u32;
         self.vertex_count += v;
@@ -140,6 +146,7 @@ impl<'a> Frame<'a> {
 
 impl Projector {
     /// Homogeneous picture coordinates of a point.
+    #[inline(always)]
     pub fn point(&self, p: Vec3) -> Vec4 {
         let row = |r: Vec4| r.x * p.x + r.y * p.y + r.z * p.z + r.w;
         Vec4::new(row(self.x), row(self.y), row(self.z), row(self.w))

@@ -1,20 +1,32 @@
-//! Triangles to pixels: a visibility buffer first, then shading once a pixel, eight pixels at a time.
+//! Triangles to pixels: a visibility buffer first, then shading once a pixel and surface, eight at a time.
 //!
 //! 1. `vertex`: each vertex to the picture plane, once, in 1/256 pixels.
 //! 2. `setup`: each triangle is culled, clipped, and put into the lists of the 64×64 tiles that it meets; triangles of a
 //!    few pixels become single samples there and then.
-//! 3. `tile`: each tile finds what is visible at each sample; `resolve` shades that and writes the colours.
+//! 3. `tile`: each tile finds what is visible at each sample (`fill`), lists it by triangle (`scan`), and shades that
+//!    (`resolve`); `colors` and `encode` write.
 //!
 //! Samples are decided in integers and ties by the order of submission, so the picture does not depend on the number of
 //! threads, on the vector instructions that the machine has, or on the order in which tiles are drawn.
+//!
+//! At four samples a pixel is shaded once for each surface in it and not for each triangle (`merge`); what is covered stays
+//! exact. A walking figure of 2,100 visible triangles in 30,000 pixels takes 30,000 evaluations then instead of 41,800.
+//!
+//! What else it is that makes it fast, with the share of the time that it saved on such a figure: samples of a pixel side by
+//! side, only touched 8×8 blocks cleared, read and encoded, pixels listed by triangle through the whole tile (together 25 %);
+//! texels decoded once, two and two in one load (`sample`, 15 %); no half vector and shorter chains of dependent operations in
+//! the shading equation (5 %).
 
 mod blend;
 mod channels;
 mod clip;
+mod colors;
 mod encode;
 mod fill;
 mod frame;
+mod merge;
 mod resolve;
+mod scan;
 mod setup;
 mod surface;
 mod tile;
@@ -69,7 +81,7 @@ pub struct Stats {
     pub drawn: u64,
     /// Samples where something opaque is seen.
     pub samples: u64,
-    /// Evaluations of the shading equation.
+    /// Evaluations of the shading equation: one for each surface in a pixel, one for each layer of what blends.
     pub shaded: u64,
 }
 

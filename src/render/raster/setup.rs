@@ -4,12 +4,12 @@ use super::clip;
 use super::frame::{Class, Draw, Frame, ROTATED};
 use super::vertex::{OUTSIDE, Vertices};
 use super::{Stats, TILE};
-use crate::math::simd::{self, I8, Isa, Kernel};
+use crate::math::simd::{self, F8, I8, Isa, Kernel};
 
 /// A sample of a small triangle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fragment {
-    /// Sample · 4096 + row in the tile · 64 + column.
+    /// (Row in the tile · 64 + column) · samples + sample.
     pub place: u32,
     pub z: f32,
     pub id: u32,
@@ -45,6 +45,9 @@ pub(super) struct TileBin {
 
 /// Triangles of at most so many pixels along each side become samples at once.
 const SMALL: i32 = 4;
+
+/// The same at four samples a pixel: more samples are better walked by themselves.
+const SMALL_OF_FOUR: i32 = 3;
 
 /// Differences up to here multiply within 32 bits.
 const SHORT: i32 = 1 << 14;
@@ -144,6 +147,24 @@ struct Group<'a> {
     hi: [I8; 2],
 }
 
+/// Planes of depth of eight triangles.
+#[derive(Clone, Copy)]
+struct Depths {
+    first: F8,
+    along: [F8; 2],
+    /// One over twice the area.
+    scale: F8,
+}
+
+impl Depths {
+    /// Where the second and third edge function have these values.
+    #[inline(always)]
+    fn at(&self, e1: I8, e2: I8) -> F8 {
+        let (b1, b2) = (e1.to_f32() * self.scale, e2.to_f32() * self.scale);
+        self.first + self.along[0] * b1 + self.along[1] * b2
+    }
+}
+
 impl Kernel for Share<'_> {
     type Output = ();
 
@@ -202,7 +223,8 @@ impl Share<'_> {
 
         // What is left is drawn at once if it is small, binned if not.
         let left = lanes & !slow & !culled & !missed;
-        let wide = (hi_x - lo_x).max(hi_y - lo_y).gt(I8::splat(SMALL - 1));
+        let most = if self.frame.samples == 1 { SMALL } else { SMALL_OF_FOUR };
+        let wide = (hi_x - lo_x).max(hi_y - lo_y).gt(I8::splat(most - 1));
         let direct = self.draw.class == Class::Opaque;
         let large = if direct { wide.bitmask() & left } else { left };
         let g = Group { tris, first, x, y, lo: [lo_x, lo_y], hi: [hi_x, hi_y] };
@@ -225,6 +247,8 @@ impl Share<'_> {
         let pick = |a: I8, b: I8| (turn.select_int(b, a), turn.select_int(a, b));
         let ((x1, x2), (y1, y2)) = (pick(g.x[1], g.x[2]), pick(g.y[1], g.y[2]));
         let (x, y) = ([g.x[0], x1, x2], [g.y[0], y1, y2]);
+        // Most triangles that are this small hold no sample, so their depths wait for the first that does.
+        let mut plane: Option<Depths> = None;
 
         // Edge functions at the first pixel's centre, with the fill rule as a bias; steps of one pixel.
         let px = g.lo[0].shift_left(8) + I8::splat(128);
@@ -238,48 +262,66 @@ impl Share<'_> {
             e[k] = dx[k] * (py - y[a]) - dy[k] * (px - x[a]) + bias[k];
         }
         let (w, h) = (g.hi[0] - g.lo[0], g.hi[1] - g.lo[1]);
-        let area = turn.select_int(I8::ZERO - area, area);
-        for j in 0..SMALL {
-            let in_rows = active & !I8::splat(j).gt(h).bitmask();
-            if in_rows == 0 {
-                break;
-            }
-            for i in 0..SMALL {
-                let in_bounds = in_rows & !I8::splat(i).gt(w).bitmask();
-                if in_bounds == 0 {
+        let (down, across) = (dx, dy);
+        for s in 0..self.frame.samples {
+            let [sx, sy] = if self.frame.samples == 1 { [0, 0] } else { ROTATED[s] };
+            let start = |k: usize| e[k] + dx[k] * I8::splat(sy) - dy[k] * I8::splat(sx);
+            let mut row = [start(0), start(1), start(2)];
+            for j in 0..SMALL {
+                let in_rows = active & !I8::splat(j).gt(h).bitmask();
+                if in_rows == 0 {
                     break;
                 }
-                for s in 0..self.frame.samples {
-                    let [sx, sy] = if self.frame.samples == 1 { [0, 0] } else { ROTATED[s] };
-                    let (ox, oy) = (I8::splat(256 * i + sx), I8::splat(256 * j + sy));
-                    let at = |k: usize| e[k] + dx[k] * oy - dy[k] * ox;
-                    let (e0, e1, e2) = (at(0), at(1), at(2));
-                    let hit = in_bounds & !(e0 | e1 | e2).bitmask();
-                    if hit != 0 {
-                        let b = [e1 - bias[1], e2 - bias[2]];
-                        self.emit(g, hit, b, area, turn, [i, j, s as i32]);
+                let mut at = row;
+                for i in 0..SMALL {
+                    let in_bounds = in_rows & !I8::splat(i).gt(w).bitmask();
+                    if in_bounds == 0 {
+                        break;
                     }
+                    let hit = in_bounds & !(at[0] | at[1] | at[2]).bitmask();
+                    if hit != 0 {
+                        let now = match plane {
+                            Some(p) => p,
+                            None => self.depths(g, turn, turn.select_int(I8::ZERO - area, area)),
+                        };
+                        plane = Some(now);
+                        let z = now.at(at[1] - bias[1], at[2] - bias[2]);
+                        self.emit(g, hit, z, [i, j, s as i32]);
+                    }
+                    for k in 0..3 {
+                        at[k] = at[k] - across[k].shift_left(8);
+                    }
+                }
+                for k in 0..3 {
+                    row[k] = row[k] + down[k].shift_left(8);
                 }
             }
         }
     }
 
+    /// Depths of eight triangles that were turned.
+    #[inline(always)]
+    fn depths(&self, g: &Group, turn: I8, area: I8) -> Depths {
+        let list = &self.vertices.z[self.draw.first_vertex..][..self.draw.object.positions.len()];
+        let mut z = [F8::ZERO; 3];
+        for c in 0..3 {
+            for k in 0..8 {
+                z[c].0[k] = list[g.tris[k][c] as usize];
+            }
+        }
+        let (z1, z2) = (turn.select(z[2], z[1]), turn.select(z[1], z[2]));
+        Depths { first: z[0], along: [z1 - z[0], z2 - z[0]], scale: F8::ONE / area.to_f32() }
+    }
+
     /// Hand the hit samples to their tiles.
     #[inline(always)]
-    fn emit(&mut self, g: &Group, hit: u32, b: [I8; 2], area: I8, turn: I8, [i, j, s]: [i32; 3]) {
+    fn emit(&mut self, g: &Group, hit: u32, z: F8, [i, j, s]: [i32; 3]) {
         for k in bits(hit) {
-            let l = k as usize;
-            let t = g.tris[l];
-            let depth = |v: u32| self.vertices.z[self.draw.first_vertex + v as usize];
-            let z = [depth(t[0]), depth(t[1]), depth(t[2])];
-            let (z1, z2) = if turn.0[l] < 0 { (z[2], z[1]) } else { (z[1], z[2]) };
-            let scale = 1.0 / area.0[l] as f32;
-            let z =
-                z[0] + (z1 - z[0]) * (b[0].0[l] as f32 * scale) + (z2 - z[0]) * (b[1].0[l] as f32 * scale);
+            let l = k as usize & 7;
             let (px, py) = ((g.lo[0].0[l] + i) as usize, (g.lo[1].0[l] + j) as usize);
             let tile = &mut self.bins.tiles[py / TILE * self.frame.tiles_x + px / TILE];
-            let place = (s as usize * TILE * TILE + py % TILE * TILE + px % TILE) as u32;
-            tile.fragments.push(Fragment { place, z, id: g.first + k });
+            let place = ((py % TILE * TILE + px % TILE) * self.frame.samples + s as usize) as u32;
+            tile.fragments.push(Fragment { place, z: z.0[l], id: g.first + k });
         }
     }
 

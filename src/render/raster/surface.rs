@@ -1,6 +1,7 @@
 //! What a triangle's corners give at a pixel: perspective-correct varyings.
 
 use super::frame::{Class, Draw, Frame, Projector};
+use super::resolve;
 use crate::math::simd::{self, F8, I8, Kernel, V8};
 use crate::render::material::{self, Points};
 use crate::render::sample::Uv;
@@ -13,7 +14,7 @@ struct Seen<'a, const ONE: bool> {
     corner: [[u32; 8]; 3],
     /// Corners relative to the pixels: x, y and w of each.
     clip: [[F8; 3]; 3],
-    /// `1 / Σ eᵢ`.
+    /// `1 / Σ eᵢ`, of the point that was pulled in.
     scale: F8,
     /// Barycentric coordinates in scene space.
     b: [F8; 3],
@@ -49,13 +50,14 @@ impl<'a, const ONE: bool> Seen<'a, ONE> {
         }
         let e = [cross(&clip[1], &clip[2]), cross(&clip[2], &clip[0]), cross(&clip[0], &clip[1])];
 
-        // Rounding and snapping may put a point just outside: pull it in.
-        let scale = F8::ONE / (e[0] + e[1] + e[2]);
-        let mut b = [(e[0] * scale).clamp01(), (e[1] * scale).clamp01(), (e[2] * scale).clamp01()];
-        let norm = F8::ONE / (b[0] + b[1] + b[2]).max(F8::splat(1e-30));
-        for b in &mut b {
-            *b = *b * norm;
-        }
+        // Rounding, snapping and centroids of several triangles may put a point just outside: pull it in.
+        let sum = e[0] + e[1] + e[2];
+        let turned = F8::ZERO.gt(sum);
+        let inside = |k: usize| turned.select(-e[k], e[k]).max(F8::ZERO);
+        let (e0, e1, e2) = (inside(0), inside(1), inside(2));
+        let norm = F8::ONE / (e0 + e1 + e2).max(F8::splat(1e-30));
+        let b = [e0 * norm, e1 * norm, e2 * norm];
+        let scale = turned.select(-norm, norm);
         let position = mix(&b, &p);
         let camera = &frame.scene.camera;
         let view = match camera.projection {
@@ -237,63 +239,81 @@ fn vectors<const ONE: bool>(list: &[Vec3], at: &[u32; 8]) -> V8 {
 }
 
 /// Homogeneous picture coordinates of a triangle's corners.
+#[inline(always)]
 pub(super) fn corners_of(frame: &Frame, draw: &Draw, id: u32) -> [Vec4; 3] {
-    draw.object.mesh.triangles[id as usize].map(|v| frame.project.point(draw.object.positions[v as usize]))
+    let [a, b, c] = draw.object.mesh.triangles[id as usize];
+    let at = |v: u32| frame.project.point(draw.object.positions[v as usize]);
+    [at(a), at(b), at(c)]
 }
 
-/// Eight points to be shaded.
+/// Points to be shaded, eight by eight.
 pub(super) struct Shade<'a, const ONE: bool> {
+    pub frame: &'a Frame<'a>,
+    pub draw: &'a Draw<'a>,
+    /// Triangles, counted in the draw; if it is one triangle, once for all.
+    pub ids: &'a [[u32; 8]],
+    /// Its corners, by [`corners_of`], if it is one triangle.
+    pub known: &'a [Vec4; 3],
+    /// Where in the tile.
+    pub keys: &'a [I8],
+    /// The tile's first pixel, from the picture's centre.
+    pub corner: [f32; 2],
+    /// Linear light, premultiplied, and alpha.
+    pub out: &'a mut [[F8; 4]],
+}
+
+impl<const ONE: bool> Shade<'_, ONE> {
+    /// Fill `out`.
+    ///
+    /// A call and not inlined: this is the largest kernel, and it is needed in several places.
+    pub fn colors(self) {
+        simd::run(self.frame.isa, self);
+    }
+}
+
+impl<const ONE: bool> Kernel for Shade<'_, ONE> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { frame, draw, ids, known, keys, corner, out } = self;
+        for (i, (keys, out)) in keys.iter().zip(out).enumerate() {
+            let [px, py] = resolve::points(corner, keys);
+            let seen = Seen::<ONE>::new(frame, draw, &ids[if ONE { 0 } else { i }], known, px, py);
+            let (c, alpha) = material::light(frame.isa, frame.scene, draw.material, &seen);
+            *out = match draw.class {
+                Class::Blend => [c.x * alpha, c.y * alpha, c.z * alpha, alpha],
+                _ => [c.x, c.y, c.z, alpha],
+            };
+        }
+    }
+}
+
+/// Eight points whose normals are asked for.
+pub(super) struct Normals<'a> {
     pub frame: &'a Frame<'a>,
     pub draw: &'a Draw<'a>,
     /// Triangles, counted in the draw.
     pub ids: &'a [u32; 8],
-    /// Its corners, by [`corners_of`], if it is one triangle.
-    pub known: &'a [Vec4; 3],
     /// Where, pixels from the picture's centre.
     pub px: F8,
     pub py: F8,
 }
 
-impl<const ONE: bool> Shade<'_, ONE> {
-    /// Linear light, premultiplied, and alpha.
-    ///
-    /// A call and not inlined: this is the largest kernel, and it is needed in several places.
-    pub fn color(self) -> [F8; 4] {
+impl Normals<'_> {
+    /// Unit shading normals, scene space.
+    pub fn find(self) -> V8 {
         simd::run(self.frame.isa, self)
     }
 }
 
-impl<const ONE: bool> Kernel for Shade<'_, ONE> {
-    type Output = [F8; 4];
-
-    #[inline(always)]
-    fn run(self) -> [F8; 4] {
-        let seen = Seen::<ONE>::new(self.frame, self.draw, self.ids, self.known, self.px, self.py);
-        let (c, alpha) = material::light(self.frame.isa, self.frame.scene, self.draw.material, &seen);
-        if self.draw.class != Class::Blend {
-            return [c.x, c.y, c.z, alpha];
-        }
-        [c.x * alpha, c.y * alpha, c.z * alpha, alpha]
-    }
-}
-
-/// Eight points whose normals are asked for.
-struct Normals<'a, const ONE: bool>(Shade<'a, ONE>);
-
-impl<const ONE: bool> Shade<'_, ONE> {
-    /// Unit shading normals, scene space.
-    pub fn normal(self) -> V8 {
-        simd::run(self.frame.isa, Normals(self))
-    }
-}
-
-impl<const ONE: bool> Kernel for Normals<'_, ONE> {
+impl Kernel for Normals<'_> {
     type Output = V8;
 
     #[inline(always)]
     fn run(self) -> V8 {
-        let Shade { frame, draw, ids, known, px, py } = self.0;
-        let seen = Seen::<ONE>::new(frame, draw, ids, known, px, py);
+        let Self { frame, draw, ids, px, py } = self;
+        let seen = Seen::<false>::new(frame, draw, ids, &[Vec4::ZERO; 3], px, py);
         material::shading_normal(frame.isa, frame.scene, draw.material, &seen)
     }
 }

@@ -1,14 +1,16 @@
 //! A row of tiles: visibility, then colour, one tile after the other.
 
 use super::blend::{self, BlendScratch};
+use super::colors::{Colors, Sink};
 use super::encode::Target;
-use super::fill::{Visibility, Walk};
-use super::frame::{Class, Frame};
-use super::resolve::{self, Area, Entries, LastDraw, Planes};
+use super::fill::{All, Keep, Visibility, Walk, lane_offsets};
+use super::frame::{Class, Draw, Frame};
+use super::resolve::{self, Area, LastDraw};
+use super::scan::Entries;
 use super::setup::{Bins, Fragment};
 use super::surface::Present;
 use super::{Stats, TILE};
-use crate::math::simd::{F8, I8, Kernel};
+use crate::math::simd::{I8, Kernel};
 use crate::render::Window;
 
 /// Working memory of one thread.
@@ -17,9 +19,11 @@ pub(super) struct TileScratch {
     pub stats: Stats,
     pub seen: Visibility,
     pub entries: Entries,
-    pub planes: Planes,
+    pub colors: Colors,
     pub blend: BlendScratch,
     pub last_draw: LastDraw,
+    /// Runs of entries of one draw.
+    pub runs: Vec<(u32, u32, u32)>,
 }
 
 /// The tiles of one row.
@@ -62,7 +66,7 @@ impl Row<'_, '_> {
 
         // What is visible at each sample?
         let area = Area { origin: [x as i32, (self.row * TILE) as i32], to, w, h: self.target.rows() };
-        self.scratch.seen.clear(frame.samples);
+        self.scratch.seen.start(frame.samples);
         for bins in self.bins {
             for &s in &bins.tiles[index].solid {
                 self.solid(bins, s, area);
@@ -77,12 +81,15 @@ impl Row<'_, '_> {
 
         // What does it look like, and what lies before it?
         let transparent = self.bins.iter().any(|b| !b.tiles[index].blend.is_empty());
-        resolve::resolve(frame, area, transparent, self.scratch);
-        if transparent {
-            blend::blend(frame, self.bins, index, area, self.scratch);
-            self.scratch.planes.average();
+        if !transparent {
+            let sink = self.target.sink();
+            resolve::resolve(frame, area, sink, self.scratch);
+            return self.target.write(to, w, &self.scratch.colors);
         }
-        self.target.write(to, w, &self.scratch.planes.c);
+        resolve::resolve(frame, area, Sink::Layers, self.scratch);
+        blend::blend(frame, self.bins, index, area, self.scratch);
+        self.scratch.colors.average();
+        self.target.write_planes(to, w, &self.scratch.colors.planes);
     }
 
     /// An opaque or masked triangle into the buffer.
@@ -93,15 +100,30 @@ impl Row<'_, '_> {
         let Some(walk) = Walk::new(frame, setup, area.origin) else { return };
         let draw = &frame.draws[setup.draw as usize];
         if draw.class == Class::Opaque {
-            return walk.fill(frame.samples, &mut self.scratch.seen, |_, _, wins| wins);
+            return walk.fill(frame.samples, &mut self.scratch.seen, All);
         }
-        let [left, top] = area.corner(frame);
-        let id = setup.id - draw.first_triangle;
-        walk.fill(frame.samples, &mut self.scratch.seen, |at, offset, wins| {
-            let px = I8::IOTA.to_f32() + (left + (at % TILE) as f32 + offset[0]);
-            let py = F8::splat(top + (at / TILE) as f32 + offset[1]);
-            wins & Present { frame, draw, id, px, py }.mask()
-        });
+        let keep = Textured { frame, draw, id: setup.id - draw.first_triangle, corner: area.corner(frame) };
+        walk.fill(frame.samples, &mut self.scratch.seen, keep);
+    }
+}
+
+/// What a material's cut-off leaves.
+struct Textured<'a> {
+    frame: &'a Frame<'a>,
+    draw: &'a Draw<'a>,
+    id: u32,
+    corner: [f32; 2],
+}
+
+impl Keep for Textured<'_> {
+    #[inline(always)]
+    fn keep(&self, at: usize, wins: I8) -> I8 {
+        let Self { frame, draw, id, corner } = *self;
+        let place = at / frame.samples;
+        let [ox, oy] = lane_offsets(frame.samples).map(|o| o.to_f32() * (1.0 / 256.0));
+        let px = ox + (corner[0] + (place % TILE) as f32);
+        let py = oy + (corner[1] + (place / TILE) as f32);
+        wins & Present { frame, draw, id, px, py }.mask()
     }
 }
 
@@ -109,6 +131,7 @@ impl Row<'_, '_> {
 #[inline(always)]
 fn put(seen: &mut Visibility, f: &Fragment) {
     let at = f.place as usize;
+    seen.touch_at(at);
     let (z, id) = (&mut seen.z[at], &mut seen.id[at]);
     if f.z > *z || (f.z == *z && f.id < *id) {
         (*z, *id) = (f.z, f.id);

@@ -175,10 +175,10 @@ fn objects(from: &Canvases, placed: &Placed, plan: &Plan, names: &[String]) -> M
 fn distinct_color(i: usize) -> [u8; 3] {
     let hue = (i as u32).wrapping_mul(0x9e37) % 0x10000 * 6;
     let (sector, f) = (hue >> 16, hue & 0xffff);
-    let high = if i % 2 == 0 { 235 } else { 170 };
+    let high = if i.is_multiple_of(2) { 235 } else { 170 };
     let low = high / 4;
-    let up = low + ((high - low) * f >> 16);
-    let down = high - ((high - low) * f >> 16);
+    let up = low + (((high - low) * f) >> 16);
+    let down = high - (((high - low) * f) >> 16);
     let [r, g, b] = match sector {
         0 => [high, up, low],
         1 => [down, high, low],

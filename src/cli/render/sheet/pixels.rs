@@ -12,7 +12,7 @@ use sinew::io::{
     picture::{self, Dither, Indexed, Mapper, Palette, PixelArt, PixelArtDesc, PngLevel, encode_indexed_png},
 };
 use sinew::render::Settings;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 /// Frames that a palette is made from.
@@ -116,7 +116,7 @@ impl PixelArgs {
             background: (alpha == 255).then_some([r, g, b]),
             scale: self.scale(),
         };
-        let palette = self.palette.as_ref().map(read).transpose()?;
+        let palette = self.palette.as_deref().map(read).transpose()?;
         let mut samples = Vec::new();
         if palette.is_none() {
             let n = job.frames.len();
@@ -136,7 +136,7 @@ impl PixelArgs {
     }
 }
 
-fn read(path: &PathBuf) -> Result<Palette, Failure> {
+fn read(path: &Path) -> Result<Palette, Failure> {
     let bad = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", path.display()));
     let bytes = io::read_file(path).map_err(|e| bad(&e))?;
     Palette::from_file_bytes(&bytes).map_err(|e| bad(&e))
