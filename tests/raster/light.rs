@@ -139,8 +139,9 @@ fn what_blends_goes_over_what_lies_behind_in_linear_light() {
     for samples in [1, 4] {
         let (picture, stats) = stage.linear(16, samples);
         assert!(picture.pixels.iter().all(|p| *p == [0.375, 0.375, 0.25, 1.0]), "{:?}", picture.pixels[0]);
-        // At 4 samples both triangles are shaded where they meet. What lies behind is not shaded at all.
-        assert_eq!(stats.shaded, 3 * if samples == 1 { 256 } else { 256 + 16 });
+        // At 4 samples both triangles of what blends are shaded where they meet, the opaque ones as one surface. What lies
+        // behind is not shaded at all.
+        assert_eq!(stats.shaded, 256 + 2 * if samples == 1 { 256 } else { 256 + 16 });
     }
     // Over nothing, alpha stays: premultiplied in linear light, straight in bytes.
     stage.meshes = vec![stage.meshes[2].clone()];
@@ -193,7 +194,7 @@ fn ball(n: usize, cut: bool) -> Stage {
 #[test]
 fn a_pixel_of_one_surface_is_shaded_once_and_looks_as_if_every_triangle_were() {
     // From triangles of some pixels to several in one; objects never join, so the cut ball shades every triangle.
-    for (n, size, worst) in [(600, 96, 4), (2400, 96, 5), (9600, 64, 6)] {
+    for (n, size, least) in [(600, 96, 59.0), (2400, 96, 56.5), (9600, 64, 50.5)] {
         let (once, each) = (ball(n, false).bytes(size, 4), ball(n, true).bytes(size, 4));
         assert_eq!(once.1.samples, each.1.samples);
         let alpha = |p: &Rgba8| p.data.chunks(4).map(|p| p[3]).collect::<Vec<_>>();
@@ -202,14 +203,14 @@ fn a_pixel_of_one_surface_is_shaded_once_and_looks_as_if_every_triangle_were() {
         // A little more than one evaluation a pixel is left, for outlines.
         let pixels = once.0.data.chunks(4).filter(|p| p[3] > 0).count() as f64;
         let (few, many) = (once.1.shaded as f64 / pixels, each.1.shaded as f64 / pixels);
-        assert!(few < 1.06 && many > 1.25, "{n}: {few} {many}");
+        assert!(few < 1.02 && many > 1.25, "{n}: {few} {many}");
 
         let off: Vec<f64> =
             once.0.data.iter().zip(&each.0.data).map(|(a, b)| a.abs_diff(*b) as f64).collect();
         let mean = off.iter().map(|d| d * d).sum::<f64>() / (3.0 * pixels);
         let psnr = 10.0 * (255.0 * 255.0 / mean).log10();
         let most = off.iter().fold(0.0, |a: f64, b| a.max(*b));
-        assert!(psnr > 50.0 && most <= worst as f64, "{n}: {psnr} dB, {most} codes");
+        assert!(psnr > least && most <= 9.0, "{n}: {psnr} dB, {most} codes");
     }
 }
 

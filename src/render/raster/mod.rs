@@ -12,10 +12,9 @@
 //! At four samples a pixel is shaded once for each surface in it and not for each triangle (`merge`); what is covered stays
 //! exact. A walking figure of 2,100 visible triangles in 30,000 pixels takes 30,000 evaluations then instead of 41,800.
 //!
-//! What else it is that makes it fast, with the share of the time that it saved on such a figure: samples of a pixel side by
-//! side, only touched 8×8 blocks cleared, read and encoded, pixels listed by triangle through the whole tile (together 25 %);
-//! texels decoded once, two and two in one load (`sample`, 15 %); no half vector and shorter chains of dependent operations in
-//! the shading equation (5 %).
+//! What else makes it fast, measured on that figure: samples of a pixel side by side, only touched 8×8 blocks cleared and read,
+//! pixels listed by triangle through the whole tile, and colours encoded as they are shaded took 26 % off; texels decoded once,
+//! four bytes each and two in one load (`sample`), another 15 %. What did not: AVX-512, as the kernels are eight lanes wide.
 
 mod blend;
 mod channels;

@@ -139,7 +139,7 @@ fn loose(frame: &Frame, area: Area, scratch: &mut TileScratch) {
         let draw = &frame.draws[d as usize];
         loop {
             while from < to {
-                if waiting.n % 8 == 0 && to - from >= 8 {
+                if waiting.n.is_multiple_of(8) && to - from >= 8 {
                     waiting.take(&keys[from as usize..], &ids[from as usize..]);
                     from += 8;
                 } else {

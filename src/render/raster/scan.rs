@@ -137,14 +137,12 @@ impl Entries {
         self.keys.resize(self.keys.len().max(end as usize), 0);
         for run in &self.runs {
             let c = &mut self.chains[run.of as usize];
-            let mut at = (c.first + c.count) as usize;
+            let at = (c.first + c.count) as usize;
             c.count += run.length;
             // A run is at most a block wide, and what is written beyond its end is overwritten by the next.
             let keys = I8::splat(run.key) + I8::IOTA;
             let out: &mut [i32; 8] = (&mut self.keys[at..at + 8]).try_into().expect("eight");
             *out = keys.0;
-            at += 8;
-            debug_assert!(run.length <= 8 && at <= end as usize);
         }
     }
 }
