@@ -230,7 +230,9 @@ fn decode_jpeg(bytes: &[u8]) -> Option<Picture> {
     }
     let mut rgba = vec![0; 4 * width * height];
     decoder.decode_into(&mut rgba).ok()?;
-    Some(Picture { width, height, rgba })
+    // Rows that a file cut short does not hold stay blank; they are to be black and opaque, as without this short way.
+    let whole = rgba.chunks_exact(4 * width).all(|row| row.ends_with(&[255]));
+    whole.then_some(Picture { width, height, rgba })
 }
 
 #[cfg(feature = "pictures")]
