@@ -251,6 +251,36 @@ impl Character {
         skin::deform(method, rest, palette, out);
     }
 
+    /// The same, if its matrices or its morph weights are not those that `last` remembers: what does not move is not
+    /// computed again. `last` and `out` belong to this instance alone. Returns whether anything was computed.
+    ///
+    /// # Panics
+    /// If `instance`, `pose` or `posed` are not of this character.
+    pub fn follow(
+        &self,
+        instance: usize,
+        pose: &Pose,
+        posed: &Posed,
+        center: DVec3,
+        scratch: &mut Scratch,
+        last: &mut Last,
+        out: &mut Deformed,
+    ) -> bool {
+        let Scratch { morphed, palette } = scratch;
+        let inst = &self.instances[instance];
+        let weights = &pose.weights[inst.first_weight..][..self.mesh(inst).targets.len()];
+        let method = self.palette(instance, posed, center, palette);
+        if last.known && last.palette == *palette && last.weights == weights {
+            return false;
+        }
+        last.known = true;
+        last.palette.clone_from(palette);
+        last.weights.clear();
+        last.weights.extend_from_slice(weights);
+        skin::deform(method, self.morph(instance, pose, morphed), palette, out);
+        true
+    }
+
     /// Positions alone, as [`deform`](Self::deform) gives them.
     ///
     /// # Panics
@@ -321,4 +351,12 @@ impl Character {
 pub struct Scratch {
     morphed: Morphed,
     palette: Vec<Affine3A>,
+}
+
+/// What an instance was last deformed by; nothing at first.
+#[derive(Clone, Debug, Default)]
+pub struct Last {
+    known: bool,
+    palette: Vec<Affine3A>,
+    weights: Vec<f32>,
 }

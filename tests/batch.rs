@@ -134,7 +134,10 @@ fn one_bad_input_does_not_stop_the_others() {
     ];
     let (code, message) = fails(&args);
     assert_eq!(code, 3, "{message}");
-    assert!(message.contains("bad.json: ") && message.contains("line 1") && message.contains("1 of 3"), "{message}");
+    assert!(
+        message.contains("bad.json: ") && message.contains("line 1") && message.contains("1 of 3"),
+        "{message}"
+    );
     let names: Vec<String> = contents(&dir.path().join("out")).into_iter().map(|(n, _)| n).collect();
     assert_eq!(names, ["flag-wave.01.png", "flag-wave.02.png", "second-wave.01.png", "second-wave.02.png"]);
     let v: serde_json::Value = serde_json::from_slice(&std::fs::read(&list).unwrap()).unwrap();

@@ -86,6 +86,24 @@ fn threads_do_not_change_a_byte() {
 }
 
 #[test]
+fn what_does_not_move_is_not_deformed_again() {
+    let rigs = rigs();
+    let (mut worker, mut out) = (Worker::default(), Rgba8::default());
+    for (name, import) in &rigs {
+        let desc = ShotDesc { view: VIEW, settings: settings(1, 1), ..Default::default() };
+        let rest = Shot::new(&import.asset, desc).unwrap();
+        let first = rest.draw(0.0, &mut worker, &mut out);
+        let before = out.clone();
+        let second = rest.draw(1.0, &mut worker, &mut out);
+        assert!(first.vertices > 0 && second.vertices == 0, "{name}: {} vertices", second.vertices);
+        assert!(before == out, "{name}");
+        let moving = shot(import, 0, [0.0; 4], settings(1, 1));
+        moving.draw(0.0, &mut worker, &mut out);
+        assert!(moving.draw(0.3, &mut worker, &mut out).vertices > 0, "{name}");
+    }
+}
+
+#[test]
 fn a_worker_that_drew_something_else_draws_the_same() {
     let rigs = rigs();
     let mut used = Worker::default();

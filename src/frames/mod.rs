@@ -39,6 +39,7 @@ use fit::Span;
 use glam::DVec3;
 use overlay::Layers;
 use stand::Stand;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// What is filmed, from where, and how it looks.
@@ -98,6 +99,8 @@ impl From<f64> for Moment {
 /// A shot that was set up: draws any of its moments.
 #[derive(Clone, Debug)]
 pub struct Shot<'a> {
+    /// Tells shots apart to workers, which remember what they deformed.
+    number: u64,
     asset: &'a Asset,
     desc: ShotDesc,
     stand: Stand<'a>,
@@ -117,7 +120,7 @@ pub struct Shot<'a> {
 pub struct FrameStats {
     /// Bones evaluated.
     pub bones: usize,
-    /// Vertices deformed.
+    /// Vertices deformed; those that did not move since the worker's last moment are not.
     pub vertices: usize,
     /// What the rasterizer counted.
     pub raster: Stats,
@@ -169,7 +172,9 @@ impl<'a> Shot<'a> {
         let stage = Stage::new(&span, &desc.look, &materials, &mut worker);
         let layers = Layers::new(&span, &desc.overlays, &mut worker)?;
         let developer = desc.look.grade.developer();
-        Ok(Self { asset, desc, stand, range, materials, center, stage, layers, developer })
+        static SHOTS: AtomicU64 = AtomicU64::new(1);
+        let number = SHOTS.fetch_add(1, Ordering::Relaxed);
+        Ok(Self { number, asset, desc, stand, range, materials, center, stage, layers, developer })
     }
 
     /// What was asked for.
@@ -265,9 +270,8 @@ impl<'a> Shot<'a> {
         let start = Instant::now();
         worker.evaluate(self.asset, self.desc.clip, time::wrap(time, self.range, self.desc.wrap));
         let posed = Instant::now();
-        worker.deform(self.asset, self.center);
+        stats.vertices += worker.deform(self.asset, self.center, self.number);
         stats.bones += worker.posed.len();
-        stats.vertices += worker.deformed.iter().map(|d| d.positions.len()).sum::<usize>();
         stats.times.pose += posed - start;
         stats.times.deform += posed.elapsed();
     }

@@ -43,6 +43,8 @@ pub(super) fn line(layer: &mut Pad, [a, b]: [DVec2; 2], width: f64, ink: Ink) {
 
 /// Put a dot on a picture.
 pub(super) fn dot(out: &mut Pad, center: DVec2, radius: f64, ink: Ink) {
+    // Coverage that falls off linearly covers π(r² + 1/12) in all; a dot is to cover its own area.
+    let radius = (radius * radius - 1.0 / 12.0).max(0.25 * radius * radius).sqrt();
     visit(out, center, center, radius, |p, old| {
         *old = Operator::OVER.pixel(ink.pixel(cover(p.distance(center), radius)), *old);
     });

@@ -2,7 +2,7 @@
 
 use super::effects::Effects;
 use crate::asset::Asset;
-use crate::character::Scratch;
+use crate::character::{Last, Scratch};
 use crate::fk::{self, Posed};
 use crate::image::Image;
 use crate::pose::Pose;
@@ -17,6 +17,9 @@ pub struct Worker {
     pub(super) posed: Posed,
     pub(super) scratch: Scratch,
     pub(super) deformed: Vec<Deformed>,
+    /// What `deformed` was made by, and for which shot.
+    last: Vec<Last>,
+    shot: u64,
     pub(super) rasterizer: Rasterizer,
     pub(super) effects: Effects,
     /// A picture on its way to 8 bits, and one that is put on it.
@@ -31,11 +34,23 @@ impl Worker {
         fk::forward(character.skeleton(), &self.pose, &mut self.posed);
     }
 
-    pub(super) fn deform(&mut self, asset: &Asset, center: DVec3) {
+    /// Deform what moved since this worker's last moment of the same shot; returns how many vertices that were.
+    pub(super) fn deform(&mut self, asset: &Asset, center: DVec3, shot: u64) -> usize {
         let character = &asset.character;
-        self.deformed.resize_with(character.instances().len(), Deformed::default);
-        for (i, out) in self.deformed.iter_mut().enumerate() {
-            character.deform(i, &self.pose, &self.posed, center, &mut self.scratch, out);
+        let n = character.instances().len();
+        self.deformed.resize_with(n, Deformed::default);
+        if self.shot != shot {
+            self.shot = shot;
+            self.last.clear();
         }
+        self.last.resize_with(n, Last::default);
+        let mut vertices = 0;
+        for (i, (out, last)) in self.deformed.iter_mut().zip(&mut self.last).enumerate() {
+            let Self { pose, posed, scratch, .. } = self;
+            if character.follow(i, pose, posed, center, scratch, last, out) {
+                vertices += out.positions.len();
+            }
+        }
+        vertices
     }
 }

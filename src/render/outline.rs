@@ -78,9 +78,12 @@ fn parted(ids: &IdImage, [x, y]: [usize; 2], [dx, dy]: [usize; 2], footprint: im
         (a, b) => return f32::from(u8::from(a.is_some() != b.is_some())),
     };
     // The surface's own slope on either side, as far as it goes on there.
-    let slope = |z: f32, before: Option<f32>| before.map_or(0.0, |q| (z - q).abs());
-    let (left, right) = (slope(a, at(-1)), slope(b, at(2)));
-    let step = STEP * footprint(a.min(b)) + left.min(right);
+    let (left, right) = (at(-1).map(|q| (a - q).abs()), at(2).map(|q| (b - q).abs()));
+    let slope = match (left, right) {
+        (Some(left), Some(right)) => left.min(right),
+        (one, other) => one.or(other).unwrap_or(0.0),
+    };
+    let step = STEP * footprint(a.min(b)) + slope;
     (((b - a).abs() / step - JUMP) / (FULL - JUMP)).clamp(0.0, 1.0)
 }
 
