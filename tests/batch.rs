@@ -80,7 +80,10 @@ fn shares_are_the_whole() {
     std::fs::write(dir.path().join("a/f.07.png"), "changed").unwrap();
     let (code, message) = fails(&["manifest", "check", &sum]);
     assert_eq!(code, 4);
-    assert!(message.contains("f.07.png: expected sha256") && message.contains("1 of 24"), "{message}");
+    assert!(
+        message.contains("f.07.png: expected sha256") && message.contains("1 faults among 24 files"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -146,6 +149,57 @@ fn one_bad_input_does_not_stop_the_others() {
 }
 
 #[test]
+fn a_manifest_never_takes_the_place_of_what_it_is_about() {
+    let (dir, input) = folder();
+    let out = |name: &str| path(&dir, name);
+    let (png, json) = (out("s.png"), out("s.json"));
+    for args in [
+        vec!["-o", &png, "--at", "0", "--manifest", &png],
+        vec!["-o", &png, "--sheet", "grid", "--fps", "2", "--manifest", &json],
+    ] {
+        let mut all = vec!["render", &input, "--size", "16"];
+        all.extend(args);
+        let (code, message) = fails(&all);
+        assert!(code == 2 && message.contains("an output has this name"), "{message}");
+    }
+    assert!(!dir.path().join("s.png").exists());
+
+    // A sheet's manifest knows what lies beside it, and a part that is missing is drawn again.
+    let list = out("list.json");
+    let args = [
+        "render",
+        &input,
+        "--size",
+        "16",
+        "-o",
+        &png,
+        "--sheet",
+        "grid",
+        "--fps",
+        "2",
+        "--maps",
+        "normal",
+        "--skip-existing",
+        "--manifest",
+        &list,
+    ];
+    succeeds(&args);
+    assert!(succeeds(&["manifest", "check", &list]).is_empty());
+    for name in ["s.normal.png", "s.json"] {
+        let before = std::fs::read(out(name)).unwrap();
+        std::fs::remove_file(out(name)).unwrap();
+        assert_eq!(fails(&["manifest", "check", &list]).0, 4, "{name} is missed");
+        succeeds(&args);
+        assert!(std::fs::read(out(name)).unwrap() == before, "{name}");
+    }
+
+    // What was not drawn is a fault of the whole.
+    let failed = out("failed.json");
+    assert_eq!(fails(&["render", "nowhere.glb", "-o", &out("n.png"), "--manifest", &failed]).0, 3);
+    assert_eq!(fails(&["manifest", "check", &failed]).0, 4);
+}
+
+#[test]
 fn names_that_would_meet_are_refused() {
     let (dir, input) = folder();
     let other = dir.path().join("other");
@@ -162,7 +216,7 @@ fn names_that_would_meet_are_refused() {
     let out = |name: &str| path(&dir, name);
     says(&["render", &input, &second, "-o", &out("a.gif")], 2, "{name}");
     says(&["render", &input, "--all-clips", "-o", &out("{name}.gif")], 2, "{clip}");
-    says(&["render", &input, "-o", &out("{nmae}.gif")], 2, "expected {name}, {folder} or {clip}");
+    says(&["render", &input, "-o", &out("{nmae}.gif")], 2, "expected {name}, {folder}, {clip} or {index}");
     says(&["render", &input, &second, "-o", &out("{name}.gif"), "--size", "16"], 2, "{folder}");
     assert!(dir.path().join("flag.gif").exists(), "the first of the two was drawn");
     succeeds(&["render", &second, "-o", &out("{folder}-{name}.gif"), "--size", "16"]);

@@ -72,13 +72,19 @@ fn check(input: &Path, folder: &Path, say: &Say) -> Result<(), Failure> {
     let manifest = read(input)?;
     let faults = manifest.check(folder);
     faults.iter().for_each(|f| say.error(&f.to_string()));
-    match faults.len() {
+    for f in &manifest.failed {
+        say.error(&format!("{}: was not drawn: {}", f.input.display(), f.error));
+    }
+    match faults.len() + manifest.failed.len() {
+        0 if manifest.files() == 0 => {
+            Err(Failure::Differs(format!("{} names no files: there is nothing to check", input.display())))
+        }
         0 => {
             say.note(&format!("{} files are as {} says", manifest.files(), input.display()));
             Ok(())
         }
         n => Err(Failure::Differs(format!(
-            "{n} of {} files are not as {} says",
+            "{n} faults among {} files of {}",
             manifest.files(),
             input.display()
         ))),

@@ -95,9 +95,9 @@ const STEPS: usize = 1024;
 /// use sinew::image::{dither::Levels, gamma::Transfer};
 /// let four = Levels::new(4, Transfer::Srgb);
 /// assert_eq!(four.codes(), [0, 85, 170, 255]);
-/// // 0.2 of the light is the signal 0.48, nearer to 170 than to 85.
-/// assert_eq!(four.nearest(0.2), 170);
-/// // In light it is between them: two fifths of the way.
+/// // 0.2 of the light is the code 123.5, nearer to 85 than to 170.
+/// assert_eq!(four.nearest(0.2), 85);
+/// // In light it is a third of the way between them.
 /// let (lower, share) = four.below(0.2);
 /// assert!(lower == 1 && (share - 0.35).abs() < 0.05, "{share}");
 /// ```

@@ -6,8 +6,8 @@
 //!   "frames": [{"frame": 1, "seconds": 0.0, "file": "run.0001.png", "sha256": "…"}]}], "failed": []}
 //! ```
 //!
-//! Of a sequence each frame has the hash of its file. Of a film, which is one file, the output has `file` and `sha256`, and each
-//! frame the hash of its pixels as they came to the encoder. A manifest holds neither times nor machine, so that the
+//! Of a sequence each frame has the hash of its file. Of a film or a sheet, which is one file, the output has `file` and `sha256`, and
+//! each frame of a film the hash of its pixels as they came to the encoder. A manifest holds neither times nor machine, so that the
 //! same work gives the same bytes, and the manifests of [shards](crate::time::Shard) merge into that of the whole.
 
 use serde::{Deserialize, Serialize};
@@ -49,8 +49,21 @@ pub struct Output {
     /// Hash of the film's file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sha256: Option<String>,
+    /// Files beside it: a sheet's description and maps.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub beside: Vec<FileEntry>,
     /// In the order of their numbers.
     pub frames: Vec<FrameEntry>,
+}
+
+/// A file and its hash.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FileEntry {
+    /// The file.
+    pub file: PathBuf,
+    /// Hash of its bytes.
+    pub sha256: String,
 }
 
 /// A frame.
@@ -225,13 +238,19 @@ impl Manifest {
         let films = self.outputs.iter().filter_map(|o| Some((o.file.as_ref()?, o.sha256.as_ref()?)));
         let frames = self.outputs.iter().flat_map(|o| &o.frames);
         let frames = frames.filter_map(|f| Some((f.file.as_ref()?, f.sha256.as_ref()?)));
-        films.chain(frames).filter_map(|(path, expected)| fault(folder.join(path), expected)).collect()
+        let beside = self.outputs.iter().flat_map(|o| &o.beside).map(|f| (&f.file, &f.sha256));
+        films
+            .chain(beside)
+            .chain(frames)
+            .filter_map(|(path, expected)| fault(folder.join(path), expected))
+            .collect()
     }
 
     /// Files that the manifest names.
     pub fn files(&self) -> usize {
         let frames = self.outputs.iter().flat_map(|o| &o.frames).filter(|f| f.file.is_some()).count();
-        frames + self.outputs.iter().filter(|o| o.file.is_some()).count()
+        let beside: usize = self.outputs.iter().map(|o| o.beside.len()).sum();
+        frames + beside + self.outputs.iter().filter(|o| o.file.is_some()).count()
     }
 }
 
@@ -293,6 +312,7 @@ mod tests {
             fps: "24".into(),
             file: None,
             sha256: None,
+            beside: vec![],
             frames: numbers.iter().map(frame).collect(),
         }
     }

@@ -71,19 +71,36 @@ static ROOTS: LazyLock<[[u32; 256]; 3]> = LazyLock::new(|| {
     })
 });
 
+/// Texels of a level from which on several threads are worth their start.
+const PARALLEL: usize = 1 << 18;
+
 /// Decode rows; each ends in its first texel again if it `repeats`, in its last otherwise.
-fn rows<T: Copy + Default>(
+fn rows<T: Copy + Default + Send>(
     bytes: &[u8],
     width: usize,
     repeats: bool,
-    decode: impl Fn(&[u8; 4]) -> T,
+    decode: impl Fn(&[u8; 4]) -> T + Sync,
 ) -> Vec<T> {
     let texels = bytes.as_chunks::<4>().0;
-    let mut out = Vec::with_capacity(texels.len() / width * (width + 1));
-    for row in texels.chunks_exact(width) {
-        out.extend(row.iter().map(&decode));
-        out.push(decode(&row[if repeats { 0 } else { width - 1 }]));
+    let height = texels.len() / width;
+    let mut out = vec![T::default(); height * (width + 1)];
+    let band = |from: &[[u8; 4]], to: &mut [T]| {
+        for (row, to) in from.chunks_exact(width).zip(to.chunks_exact_mut(width + 1)) {
+            to.iter_mut().zip(row).for_each(|(to, t)| *to = decode(t));
+            to[width] = to[if repeats { 0 } else { width - 1 }];
+        }
+    };
+    let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
+    if threads == 1 || texels.len() < PARALLEL {
+        band(texels, &mut out);
+        return out;
     }
+    let share = height.div_ceil(threads);
+    std::thread::scope(|scope| {
+        for (from, to) in texels.chunks(share * width).zip(out.chunks_mut(share * (width + 1))) {
+            scope.spawn(|| band(from, to));
+        }
+    });
     out
 }
 

@@ -5,7 +5,7 @@ use super::stats::{Form, Totals};
 use super::time::Frame;
 use super::{Args, Plan, Task, draw, list, plan};
 use crate::cli::{Failure, load_posed, print, say, say::Say};
-use sinew::io::manifest::{self, Failed, FrameEntry, Manifest, Output};
+use sinew::io::manifest::{self, Failed, FileEntry, FrameEntry, Manifest, Output};
 use sinew::io::picture::{AtomicFile, Fields, Folder, Target, Template};
 use sinew::io::{Import, Options};
 use sinew::time::Shard;
@@ -69,7 +69,12 @@ impl<'a> Batch<'a> {
     fn new(args: &'a Args, say: &'a Say) -> Result<Self, Failure> {
         let usage = |e: &dyn std::fmt::Display| Failure::Usage(e.to_string());
         let template = Template::parse(args.output.name()).map_err(|e| usage(&e))?;
-        args.output.target(&template.fill(&Fields { name: "name", folder: "folder", clip: "clip" }))?;
+        args.output.target(&template.fill(&Fields {
+            name: "name",
+            folder: "folder",
+            clip: "clip",
+            index: 0,
+        }))?;
         args.sheet.settings(args.output.settings()?)?;
         if args.inputs.len() > 1 && !template.tells_inputs() {
             let message = "-o: several inputs need {name} (or {folder}) in the output's name";
@@ -78,12 +83,8 @@ impl<'a> Batch<'a> {
         if args.batch.all_clips && !template.tells_clips() {
             return Err(Failure::Usage("-o: --all-clips needs {clip} in the output's name".into()));
         }
-        if let Some(path) = args.batch.manifest.as_ref().filter(|p| p.exists()) {
-            if !args.output.force && !args.batch.skip_existing {
-                let message = format!("{}: the file exists; --force overwrites it", path.display());
-                return Err(Failure::Run(message));
-            }
-            keep_inputs(args, path)?;
+        if let Some(path) = &args.batch.manifest {
+            check_manifest(args, path)?;
         }
         let (taken, manifest) = (BTreeMap::new(), Manifest::new());
         let (failures, totals, start) = (vec![], Totals::default(), Instant::now());
@@ -119,13 +120,12 @@ impl<'a> Batch<'a> {
     fn sum_up(self) -> Result<(), Failure> {
         let failed = self.failures.len();
         let Some(worst) = self.failures.into_iter().reduce(Failure::worse) else { return Ok(()) };
-        if self.tasks + failed < 2 {
-            return Err(worst.with_message("nothing was drawn".into()));
-        }
-        Err(worst.with_message(format!(
-            "{failed} of {} outputs failed; the others were written",
-            self.tasks + failed
-        )))
+        let all = self.tasks + failed;
+        Err(worst.with_message(match self.tasks {
+            0 if all == 1 => "the manifest lists what was written before".into(),
+            0 => format!("all {all} outputs failed"),
+            _ => format!("{failed} of {all} outputs failed; the others were written"),
+        }))
     }
 
     fn input(&mut self, input: &Path) -> Result<(), Failure> {
@@ -155,7 +155,7 @@ impl<'a> Batch<'a> {
         if self.args.batch.all_clips || self.template.tells_clips() {
             return Ok(false);
         }
-        let target = self.target(input, "")?;
+        let target = self.target(input, "", 0)?;
         if matches!(target, Target::Sequence(..)) {
             return Ok(false);
         }
@@ -165,6 +165,7 @@ impl<'a> Batch<'a> {
         }
         let path = target.path_of(1).filter(|p| self.args.batch.skip_existing && p.exists());
         if let Some(path) = path
+            && self.args.sheet.companions(&target).iter().all(|p| p.exists())
             && self.args.batch.manifest.is_none()
             && !self.args.batch.dry_run
         {
@@ -175,35 +176,51 @@ impl<'a> Batch<'a> {
         Ok(false)
     }
 
-    fn target(&self, input: &Path, clip: &str) -> Result<Target, Failure> {
+    fn target(&self, input: &Path, clip: &str, index: usize) -> Result<Target, Failure> {
         let lossy = |s: Option<&std::ffi::OsStr>| s.unwrap_or_default().to_string_lossy().into_owned();
         let name = lossy(input.file_stem());
         let folder = lossy(input.parent().and_then(|p| p.file_name()));
-        self.args.output.target(&self.template.fill(&Fields { name: &name, folder: &folder, clip }))
+        self.args.output.target(&self.template.fill(&Fields { name: &name, folder: &folder, clip, index }))
     }
 
     fn clip(&mut self, input: &Path, import: &Import, clip: Option<usize>) -> Result<(), Failure> {
         let clip_name = clip.map(|c| import.asset.character.clips()[c].name.clone());
-        let target = self.target(input, clip_name.as_deref().unwrap_or("rest"))?;
+        let target = self.target(input, clip_name.as_deref().unwrap_or("rest"), clip.unwrap_or(0))?;
         self.claim(input, &clip_name, &target)?;
         target.path_of(1).map_or(Ok(()), |path| keep_inputs(self.args, &path))?;
-        self.args.sheet.companions(&target).iter().try_for_each(|p| keep_inputs(self.args, p))?;
+        let companions = self.args.sheet.companions(&target);
+        companions.iter().try_for_each(|p| keep_inputs(self.args, p))?;
         let task = Task { input, import, clip, target: &target };
         let mut plan = plan(self.args, &task)?;
         self.take_share(&target, &mut plan.frames);
+        self.keep_manifest(
+            plan.frames.iter().filter_map(|f| target.path_of(f.number)).chain(companions.clone()),
+        )?;
         if plan.frames.is_empty() {
+            self.say.note(&format!("{}: no part of it is in this shard", target.name().display()));
             return Ok(());
         }
         let all = plan.frames.clone();
         let skip = self.args.batch.skip_existing;
+        let skip = skip && companions.iter().all(|p| p.exists());
         let there = |f: &Frame| skip && target.path_of(f.number).is_some_and(|p| p.exists());
         plan.frames.retain(|f| !there(f));
         if self.args.batch.dry_run {
-            return announce(&task, &plan, all.len());
+            return announce(&task, &plan, all.len(), &companions);
+        }
+        if self.template.tells_inputs() || self.template.tells_clips() {
+            make_folder(&target)?;
         }
         let done = match plan.frames.is_empty() {
-            true => Written::default(),
-            false => draw(self.args, &task, &plan, &mut self.totals, self.say)?,
+            true => Ok(Written::default()),
+            false => draw(self.args, &task, &plan, &mut self.totals, self.say),
+        };
+        let done = match done {
+            Ok(done) => done,
+            Err(failure) => {
+                self.record_part(&task, clip_name, &all, plan)?;
+                return Err(failure);
+            }
         };
         if plan.frames.len() < all.len() {
             let kept = all.len() - plan.frames.len();
@@ -240,7 +257,7 @@ impl<'a> Batch<'a> {
         let path = target.path_of(1).unwrap_or("-".into());
         match self.taken.get(&path) {
             Some(other) => Err(Failure::Usage(format!(
-                "{}: {other} and {source} would be written there; tell them apart by {{folder}}, {{name}} or {{clip}}",
+                "{}: {other} and {source} would be written there; tell them apart by {{folder}}, {{name}}, {{clip}} or {{index}}",
                 path.display()
             ))),
             None => {
@@ -248,6 +265,42 @@ impl<'a> Batch<'a> {
                 Ok(())
             }
         }
+    }
+
+    /// After a failure: list the frames of a sequence that were written before it.
+    fn record_part(
+        &mut self,
+        task: &Task,
+        clip: Option<String>,
+        all: &[Frame],
+        mut plan: Plan,
+    ) -> Result<(), Failure> {
+        // With --force a file that is there may be an older one.
+        if self.args.batch.manifest.is_none() || self.args.output.force {
+            return Ok(());
+        }
+        let there = |f: &&Frame| task.target.path_of(f.number).is_some_and(|p| p.exists());
+        let written: Vec<Frame> = all.iter().filter(there).copied().collect();
+        if !matches!(task.target, Target::Sequence(..)) || written.is_empty() {
+            return Ok(());
+        }
+        plan.frames.clear();
+        self.record(task, clip, &written, &plan, Written::default())
+    }
+
+    /// Refuse to write the manifest over what it is about.
+    fn keep_manifest(&self, outputs: impl Iterator<Item = PathBuf>) -> Result<(), Failure> {
+        let Some(manifest) = &self.args.batch.manifest else { return Ok(()) };
+        let place = |p: &Path| std::path::absolute(p).unwrap_or_else(|_| p.to_owned());
+        let own = place(manifest);
+        for path in outputs {
+            if place(&path) == own {
+                let message =
+                    format!("--manifest {}: an output has this name; choose another", path.display());
+                return Err(Failure::Usage(message));
+            }
+        }
+        Ok(())
     }
 
     /// List what was drawn and what was there already.
@@ -262,7 +315,7 @@ impl<'a> Batch<'a> {
         let hash = |path: &Path| {
             manifest::sha256_of_file(path).map_err(|e| Failure::Run(format!("{}: {e}", path.display())))
         };
-        let single = !task.target.is_film(all.len());
+        let single = !task.target.is_film(all.len()) && !self.args.sheet.is_one_picture();
         let mut drawn: BTreeMap<i64, String> =
             plan.frames.iter().map(|f| f.number).zip(done.hashes).collect();
         let mut frames = vec![];
@@ -275,6 +328,9 @@ impl<'a> Batch<'a> {
             frames.push(FrameEntry { frame: f.number, seconds: f.moment.time, file, sha256 });
         }
         let film = task.target.path_of(1).filter(|_| !single);
+        let companions = self.args.sheet.companions(task.target);
+        let beside: Vec<_> =
+            companions.into_iter().map(|file| Ok(FileEntry { sha256: hash(&file)?, file })).collect();
         self.manifest.outputs.push(Output {
             input: task.input.to_owned(),
             input_sha256: hash(task.input)?,
@@ -284,6 +340,7 @@ impl<'a> Batch<'a> {
             fps: self.args.time.fps.to_string(),
             sha256: film.as_deref().map(hash).transpose()?,
             file: film,
+            beside: beside.into_iter().collect::<Result<_, Failure>>()?,
             frames,
         });
         Ok(())
@@ -300,17 +357,45 @@ impl<'a> Batch<'a> {
     }
 }
 
+/// Refuse names that a manifest cannot have, before anything is drawn.
+fn check_manifest(args: &Args, path: &Path) -> Result<(), Failure> {
+    let bad = |why: &str| Err(Failure::Usage(format!("--manifest {}: {why}", path.display())));
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if path.as_os_str() == "-" || path.is_dir() {
+        return bad("expected a file's name");
+    }
+    if !folder.is_dir() && !args.batch.dry_run {
+        return bad("its folder does not exist; create it first (mkdir -p)");
+    }
+    if path.exists() && !args.output.force && !args.batch.skip_existing {
+        return Err(Failure::Run(format!("{}: the file exists; --force overwrites it", path.display())));
+    }
+    keep_inputs(args, path)
+}
+
+/// Where names are made from inputs and clips, so are folders.
+fn make_folder(target: &Target) -> Result<(), Failure> {
+    let path = target.path_of(1);
+    let Some(folder) = path.as_deref().and_then(|p| p.parent()).filter(|p| !p.as_os_str().is_empty()) else {
+        return Ok(());
+    };
+    std::fs::create_dir_all(folder)
+        .map_err(|e| Failure::Run(format!("{}: cannot create the folder: {e}", folder.display())))
+}
+
 /// Say what would be written.
-fn announce(task: &Task, plan: &Plan, all: usize) -> Result<(), Failure> {
+fn announce(task: &Task, plan: &Plan, all: usize, beside: &[PathBuf]) -> Result<(), Failure> {
     let [w, h] = plan.size;
     let clip = task.clip.map_or("rest", |c| task.import.asset.character.clips()[c].name.as_str());
     let n = plan.frames.len();
-    let line = format!(
-        "{}: {n} of {all} frames of {w}x{h}, {} of {}\n",
+    let mut line = format!(
+        "{}: {n} of {all} frames of {w}x{h}, {} of {}",
         task.target.name().display(),
         say::name(clip),
         task.input.display()
     );
+    beside.iter().for_each(|p| line += &format!(", with {}", p.display()));
+    line.push('\n');
     print(line.as_bytes())
 }
 

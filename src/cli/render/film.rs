@@ -12,6 +12,8 @@ use sinew::io::picture::{
 };
 use sinew::time::Rate;
 use std::io::Write;
+use std::path::Path;
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 /// Frames that a palette is made from.
@@ -33,9 +35,29 @@ pub struct Job<'a> {
     pub art: Option<Painter>,
     /// Pixels of a finished frame for each one that is drawn, across and down.
     pub scale: usize,
+    /// What a sheet cost so far.
+    pub cost: Mutex<Written>,
 }
 
 impl Job<'_> {
+    /// Draw a moment of a sheet, and count what it cost.
+    pub fn draw(&self, moment: Moment, worker: &mut Worker) -> Rgba8 {
+        let mut picture = Rgba8::default();
+        let stats = self.shot.draw(moment, worker, &mut picture);
+        self.cost.lock().unwrap_or_else(|e| e.into_inner()).drawn += stats;
+        picture
+    }
+
+    /// Write a file of a sheet.
+    pub fn write(&self, path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+        let start = Instant::now();
+        let done = AtomicFile::write(path, bytes, self.force, Folder::MustExist);
+        let mut cost = self.cost.lock().unwrap_or_else(|e| e.into_inner());
+        cost.bytes += bytes.len() as u64;
+        cost.write += start.elapsed();
+        done.map_err(|e| Failure::Run(e.to_string()))
+    }
+
     /// Pixels of a finished frame.
     pub fn size(&self) -> [usize; 2] {
         self.shot.size().map(|side| side * self.scale)

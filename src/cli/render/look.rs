@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args)]
 #[command(next_help_heading = "Look")]
 pub struct LookArgs {
-    /// Behind the character: transparent, #rrggbb, or from top to bottom #rrggbb,#rrggbb.
+    /// Behind the character: transparent, #rrggbb, or from top to bottom #rrggbb,#rrggbb; #e8eaed if not said.
     #[arg(long, value_name = "COLOR[,COLOR]", value_parser = parse_background)]
     background: Option<Background>,
     /// studio (key, fill and rim lights that go round with the camera), sun (one sun, fixed in the world), flat (no lamps: colours
@@ -67,6 +67,11 @@ struct Background {
 const PAPER: u32 = 0xe8eaed;
 
 impl LookArgs {
+    /// Whether a background was asked for.
+    pub fn has_background(&self) -> bool {
+        self.background.is_some()
+    }
+
     /// What the options say, for an asset; `warn` is told what has no effect on it.
     pub fn look(&self, asset: &Asset, warn: impl Fn(&str)) -> Result<Look, Failure> {
         let file = self.look.as_ref().map(|p| read(p)).transpose()?.unwrap_or_default();

@@ -14,9 +14,9 @@ mod time;
 use super::{Failure, print, say, say::Say};
 use film::{Job, Written};
 use sinew::asset::Asset;
-use sinew::frames::{Shot, ShotDesc};
+use sinew::frames::{Look, Shot, ShotDesc};
 use sinew::io::Import;
-use sinew::io::picture::Target;
+use sinew::io::picture::{Format, Target};
 use sinew::render::Settings;
 use sinew::time::Range;
 use stats::Totals;
@@ -37,7 +37,7 @@ Examples:
   sinew render fox.glb -o fox-contact.png --contact 6x4 --size 160
   sinew render fox.glb -o icon.png --camera isometric --background transparent
   sinew render rigs/fox.json -o round.gif --turntable
-  sinew render *.glb --all-clips -o thumbs/{name}-{clip}.gif
+  sinew render *.glb --all-clips -o thumbs/{name}-{clip}.webp
   sinew render fox.glb -o farm.####.png --shard 2/4 --manifest part2.json
   sinew render fox.glb --list
 
@@ -110,13 +110,21 @@ fn plan(args: &Args, task: &Task) -> Result<Plan, Failure> {
 fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -> Result<Written, Failure> {
     let asset = &task.import.asset;
     let character = &asset.character;
-    if character.instances().iter().all(|i| character.mesh(i).triangles.is_empty()) {
+    let overlays = args.overlay.overlays(asset, args.time.fps)?;
+    let bare = character.instances().iter().all(|i| character.mesh(i).triangles.is_empty());
+    if bare && overlays.is_empty() {
         say.warn(&format!("{}: there are no triangles; the picture will be empty", task.input.display()));
     }
 
     let range = task.clip.map_or(Range::default(), |c| character.clips()[c].playback());
-    if let Some(note) = args.camera.turntable.and_then(|lap| args.time.seam(range, lap)) {
+    let seam = args.camera.turntable.and_then(|lap| args.time.seam(range, lap));
+    if let Some(note) = seam.filter(|_| plan.frames.len() > 1) {
         say.note(&note);
+    }
+    let frozen = |f: &&Frame| args.time.is_frozen(range, f.moment.time, args.camera.turntable);
+    let frozen = plan.frames.iter().filter(frozen).count();
+    if frozen > 1 {
+        say.note(&format!("{frozen} frames lie outside the clip and show its end; --wrap loop goes on"));
     }
 
     // One picture is drawn by all threads, many by one thread each.
@@ -131,10 +139,11 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         view: args.sheet.view(args.camera.view(asset)?, args.camera.is_default()),
         framing: args.camera.framing(asset)?,
         look: args.look.look(asset, |m| say.warn(m))?,
-        overlays: args.overlay.overlays(asset, args.time.fps)?,
+        overlays,
         crop: args.camera.crop([settings.width, settings.height])?,
         settings,
     };
+    say_what_is_left_out(args, task.target, &desc.look, say);
     let background = if args.sheet.is_transparent() { [0.0; 4] } else { desc.look.background };
     let transparent = look::transparent(&desc.look) || args.sheet.is_transparent();
     let start = Instant::now();
@@ -150,21 +159,39 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         target: task.target,
         level: args.output.png,
         threads,
-        force: args.output.force,
+        // A sheet of which a part is there already is drawn again as a whole.
+        force: args.output.force || (one_picture && args.batch.skip_existing),
         hash: args.batch.manifest.is_some(),
         art: None,
+        cost: Default::default(),
         scale: args.sheet.pixels.scale(),
     };
+    let frames = job.frames.len();
     job.art = args.sheet.pixels.art(&job, background, say)?;
     let written = if one_picture {
         let name = task.clip.map_or("rest", |c| character.clips()[c].name.as_str());
         args.sheet.write(&job, name, say)?;
-        Written::default()
+        job.cost.into_inner().unwrap_or_else(|e| e.into_inner())
     } else {
         film::write(&job, say)?
     };
-    totals.add(&written, job.frames.len());
+    totals.add(&written, frames);
     Ok(written)
+}
+
+/// Options that the format has no place for are not dropped in silence.
+fn say_what_is_left_out(args: &Args, target: &Target, look: &Look, say: &Say) {
+    if target.format() == Format::Exr && !look.grade.is_plain() {
+        say.warn(
+            "OpenEXR holds linear light: --exposure, --tone, --gamma and --dither are left to its reader",
+        );
+    }
+    if target.format() == Format::Y4m && look::transparent(look) {
+        say.warn("Y4M holds no alpha: the film is laid over white");
+    }
+    if args.sheet.is_transparent() && args.look.has_background() {
+        say.warn("a sheet is transparent: --background is left out");
+    }
 }
 
 fn list(asset: &Asset) -> Result<(), Failure> {

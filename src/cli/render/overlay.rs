@@ -29,10 +29,10 @@ pub struct OverlayArgs {
     /// Width of paths, in pixels.
     #[arg(long, value_name = "PIXELS", default_value = "2.5", value_parser = parse_width)]
     path_width: f32,
-    /// Draw the bones over the character; those that are named stand out, as in --bones Head,Spine.
+    /// Draw the bones over the character; those that are named stand out, as in --bones=Head,Spine.
     #[arg(long, value_name = "NAMES", num_args = 0..=1, default_missing_value = "", require_equals = true)]
     bones: Option<String>,
-    /// Draw the bones and the character over them, so opaque: 0.35 if not said, 0 for the bones alone.
+    /// Draw the bones and the character over them, so opaque, as in --xray=0.2: 0.35 if not said, 0 for the bones alone.
     #[arg(long, value_name = "OPACITY", num_args = 0..=1, default_missing_value = "0.35", require_equals = true, value_parser = parse_share)]
     xray: Option<f32>,
 }

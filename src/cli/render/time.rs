@@ -86,6 +86,12 @@ impl TimeArgs {
         Moment { time, turn: steps.map_or(0.0, around) as f32 }
     }
 
+    /// Whether a moment shows the clip's first or last pose because it lies outside.
+    pub fn is_frozen(&self, range: Range, time: f64, lap: Option<f64>) -> bool {
+        let outside = time < range.start - 1e-9 || time > range.end + 1e-9;
+        range.duration() > 0.0 && outside && self.wrap(lap) == Wrap::Clamp
+    }
+
     /// What times outside the clip show; a clip goes on while the camera walks around.
     pub fn wrap(&self, lap: Option<f64>) -> Wrap {
         if lap.is_some() && self.wrap == Wrap::Clamp { Wrap::Loop } else { self.wrap }

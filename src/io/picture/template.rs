@@ -2,13 +2,13 @@
 
 /// An output's name with fields for what is drawn.
 ///
-/// `{name}` is the input's name without folder and ending, `{folder}` the name of its folder, `{clip}` that of the clip; `{{` and
+/// `{name}` is the input's name without folder and ending, `{folder}` the name of its folder, `{clip}` that of the clip, `{index}` its number; `{{` and
 /// `}}` stand for braces.
 ///
 /// ```
 /// use sinew::io::picture::{Fields, Template};
 /// let template = Template::parse("thumbs/{name}-{clip}.####.png").unwrap();
-/// let fields = Fields { name: "fox", folder: "in", clip: "Run / fast #2" };
+/// let fields = Fields { name: "fox", folder: "in", clip: "Run / fast #2", index: 3 };
 /// assert_eq!(template.fill(&fields), "thumbs/fox-Run _ fast _2.####.png");
 /// assert!(Template::parse("{nmae}.png").is_err());
 /// ```
@@ -23,6 +23,7 @@ enum Part {
     Name,
     Folder,
     Clip,
+    Index,
 }
 
 /// What the fields stand for; characters that a file's name cannot have, or that mean a frame number, become `_`.
@@ -34,12 +35,14 @@ pub struct Fields<'a> {
     pub folder: &'a str,
     /// `{clip}`.
     pub clip: &'a str,
+    /// `{index}`: the clip's number in its file, from 0.
+    pub index: usize,
 }
 
 /// Braces that mean nothing.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "\"{text}\": found \"{found}\"; expected {{name}}, {{folder}} or {{clip}}, and {{{{ or }}}} for a brace"
+    "\"{text}\": found \"{found}\"; expected {{name}}, {{folder}}, {{clip}} or {{index}}, and {{{{ or }}}} for a brace"
 )]
 pub struct TemplateError {
     /// The whole name.
@@ -57,7 +60,12 @@ impl Template {
         let mut parts = vec![];
         let mut rest = text;
         while !rest.is_empty() {
-            let fields = [("{name}", Part::Name), ("{folder}", Part::Folder), ("{clip}", Part::Clip)];
+            let fields = [
+                ("{name}", Part::Name),
+                ("{folder}", Part::Folder),
+                ("{clip}", Part::Clip),
+                ("{index}", Part::Index),
+            ];
             let braces = [("{{", Part::Text("{".into())), ("}}", Part::Text("}".into()))];
             let special = fields.into_iter().chain(braces).find(|(key, _)| rest.starts_with(key));
             if let Some((key, part)) = special {
@@ -81,6 +89,7 @@ impl Template {
             Part::Name => harmless(fields.name),
             Part::Folder => harmless(fields.folder),
             Part::Clip => harmless(fields.clip),
+            Part::Index => fields.index.to_string(),
         };
         self.parts.iter().map(part).collect()
     }
@@ -92,7 +101,7 @@ impl Template {
 
     /// Whether the clips of an input get different names.
     pub fn tells_clips(&self) -> bool {
-        self.parts.contains(&Part::Clip)
+        self.parts.iter().any(|p| matches!(p, Part::Clip | Part::Index))
     }
 }
 
@@ -112,8 +121,9 @@ mod tests {
 
     #[test]
     fn names_from_files_lead_nowhere_else() {
-        let fill =
-            |clip| Template::parse("o/{clip}.png").unwrap().fill(&Fields { name: "", folder: "", clip });
+        let fill = |clip| {
+            Template::parse("o/{clip}.png").unwrap().fill(&Fields { name: "", folder: "", clip, index: 0 })
+        };
         assert_eq!(fill("../../etc/passwd"), "o/_.._etc_passwd.png");
         assert_eq!(fill(".."), "o/_.png");
         assert_eq!(fill("a%d#{clip}\n"), "o/a_d_{clip}_.png");
@@ -123,7 +133,7 @@ mod tests {
     #[test]
     fn braces_are_explained() {
         let says = |text: &str| Template::parse(text).unwrap_err().to_string();
-        assert!(says("{clp}.png").contains("expected {name}, {folder} or {clip}, and {{ or }}"));
+        assert!(says("{clp}.png").contains("expected {name}, {folder}, {clip} or {index}, and {{ or }}"));
         assert!(says("a}.png").contains("\"}.png\""));
         assert_eq!(Template::parse("{{{name}}}").unwrap().parts.len(), 3);
     }

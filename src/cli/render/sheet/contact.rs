@@ -5,8 +5,7 @@ use super::super::time::Frame;
 use super::draw;
 use crate::cli::{Failure, say::Say};
 use sinew::frames::{Shot, Worker};
-use sinew::image::Rgba8;
-use sinew::io::picture::{self, AtomicFile, Folder};
+use sinew::io::picture;
 use sinew::sheet::{Canvas, Limits, Margins, Rect, grid};
 use std::path::Path;
 
@@ -44,8 +43,7 @@ pub fn write([columns, rows]: [usize; 2], job: &Job, path: &Path, say: &Say) -> 
         Some(art) => {
             let mut canvas = Canvas::new(&layout, art.palette().transparent());
             let one = |w: &mut Worker, f: &Frame| {
-                let mut out = Rgba8::default();
-                job.shot.draw(f.moment, w, &mut out);
+                let out = job.draw(f.moment, w);
                 art.map(&out).indices
             };
             draw::frames(job, job.frames, say, one, put(&mut canvas, &layout.places))?;
@@ -54,8 +52,7 @@ pub fn write([columns, rows]: [usize; 2], job: &Job, path: &Path, say: &Say) -> 
         None => {
             let mut canvas = Canvas::new(&layout, fill);
             let one = |w: &mut Worker, f: &Frame| {
-                let mut out = Rgba8::default();
-                job.shot.draw(f.moment, w, &mut out);
+                let out = job.draw(f.moment, w);
                 out.data.as_chunks::<4>().0.to_vec()
             };
             draw::frames(job, job.frames, say, one, put(&mut canvas, &layout.places))?;
@@ -63,7 +60,7 @@ pub fn write([columns, rows]: [usize; 2], job: &Job, path: &Path, say: &Say) -> 
         }
     };
     let failed = |e: picture::Error| Failure::Run(e.to_string());
-    AtomicFile::write(path, &bytes.map_err(failed)?, job.force, Folder::MustExist).map_err(failed)?;
+    job.write(path, &bytes.map_err(failed)?)?;
     let [w, h] = layout.size;
     say.note(&format!("wrote {}: {columns} × {rows} moments, {w} × {h} pixels", path.display()));
     Ok(())

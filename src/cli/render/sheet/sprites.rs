@@ -6,7 +6,7 @@ use super::{Kind, Painter, Pivot, SheetArgs, draw, maps};
 use crate::cli::{Failure, say::Say};
 use sinew::frames::{Moment, Worker};
 use sinew::image::Rgba8;
-use sinew::io::picture::{self, AtomicFile, Folder};
+use sinew::io::picture;
 use sinew::io::sheet_json::to_json;
 use sinew::sheet::{
     Canvas, Direction, Distinct, Layout, Limits, Margins, Packing, Rect, Sheet, SheetError, Sprite, Tag,
@@ -60,7 +60,7 @@ pub fn write(
         files.push((path.with_extension("json"), to_json(&sheet, style).into_bytes()));
     }
     for (path, bytes) in &files {
-        AtomicFile::write(path, bytes, job.force, Folder::MustExist).map_err(failed)?;
+        job.write(path, bytes)?;
     }
     let names: Vec<String> = files.iter().map(|f| f.0.display().to_string()).collect();
     let ([w, h], frames, places) = (placed.layout.size, plan.frames.len(), placed.layout.places.len());
@@ -118,8 +118,7 @@ fn lay_out<P: Copy + Eq + Hash + Send>(
     let (job, size, limits) = (plan.job, plan.job.size(), Limits::default());
     let failed = |e: SheetError| Failure::Run(format!("--sheet: {e}"));
     let drawn = |w: &mut Worker, f: &Frame| {
-        let mut out = Rgba8::default();
-        job.shot.draw(f.moment, w, &mut out);
+        let out = job.draw(f.moment, w);
         finish(out)
     };
     let whole = Rect::whole(size);
