@@ -107,8 +107,8 @@ impl<'a> Batch<'a> {
     /// One failure among many is told and kept; alone it ends the run.
     fn fail(&mut self, input: &Path, failure: Failure) -> Result<(), Failure> {
         let many = self.args.inputs.len() > 1 || self.args.batch.all_clips;
-        let fatal = !many && self.args.batch.manifest.is_none();
-        if fatal {
+        let mistaken = matches!(failure, Failure::Usage(_));
+        if !many && (mistaken || self.args.batch.manifest.is_none()) {
             return Err(failure);
         }
         self.say.error(failure.message());
