@@ -1,6 +1,7 @@
 //! Which points a framing must hold: all vertices, over the whole clip.
 
 use super::framing::Framing;
+use super::ordered::in_order;
 use super::worker::Worker;
 use crate::asset::Asset;
 use crate::skeleton::BoneId;
@@ -24,6 +25,9 @@ impl Span<'_> {
     }
 }
 
+/// Vertices of all moments from which on several threads are worth their start.
+const PARALLEL: usize = 1 << 20;
+
 /// Show `see` the vertices of every mesh at moments of the whole clip, as seen by a camera that follows `anchor`: a bone,
 /// and where it stands in the world when the camera does not move.
 ///
@@ -43,24 +47,37 @@ pub(super) fn each_moment(
     let most = (Framing::VERTICES / vertices.max(1)).clamp(Framing::FEWEST, Framing::MOST);
     let range = span.range();
     let moments = (range.duration() * 24.0).clamp(0.0, (most - 1) as f64).ceil() as usize + 1;
-    let mut points = Vec::new();
-    for k in 0..moments {
+    let look = |worker: &mut Worker, k: usize, see: &mut dyn FnMut(&[Vec3])| {
         let t = range.start + range.duration() * k as f64 / (moments - 1).max(1) as f64;
         worker.evaluate(span.asset, span.clip, t);
-        let Worker { pose, posed, scratch, .. } = &mut *worker;
+        let Worker { pose, posed, scratch, .. } = worker;
         let center = span.center + anchor.map_or(DVec3::ZERO, |(bone, at)| posed.origin(bone) - at);
+        let mut points = Vec::new();
         for &i in &instances {
             character.positions(i, pose, posed, center, scratch, &mut points);
             see(&points);
         }
         if instances.is_empty() {
             let skeleton = character.skeleton();
-            points.clear();
             for bone in skeleton.ids() {
                 let m = posed.near(bone, center);
                 points.extend([m.translation.into(), m.transform_point3(skeleton.tip(bone))]);
             }
             see(&points);
         }
+    };
+    if moments * vertices < PARALLEL {
+        return (0..moments).for_each(|k| look(worker, k, &mut see));
     }
+    let threads = std::thread::available_parallelism().map_or(1, |n| n.get().min(8));
+    let gather = |worker: &mut Worker, k: usize| {
+        let mut all = Vec::with_capacity(vertices);
+        look(worker, k, &mut |points| all.extend_from_slice(points));
+        all
+    };
+    let seen = in_order(moments, threads, Worker::default, gather, |_, points| {
+        see(&points);
+        Ok(())
+    });
+    debug_assert!(seen.is_ok(), "nobody stops it");
 }
