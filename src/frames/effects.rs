@@ -48,23 +48,15 @@ impl Stage {
         if !look.needs_stage() {
             return None;
         }
-        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        if look.ground.is_some() || look.shadows != Shadows::None {
-            fit::each_moment(span, None, worker, |points| {
-                for p in points.iter().filter(|p| p.is_finite()) {
-                    (low, high) = (low.min(*p), high.max(*p));
-                }
-            });
-        }
-        if !low.is_finite() {
-            (low, high) = (Vec3::splat(-0.5), Vec3::splat(0.5));
-        }
+        let stands = look.ground.is_some() || look.shadows != Shadows::None;
+        let found = stands.then(|| fit::bounds(span, None, worker)).filter(|[low, _]| low.is_finite());
+        let bounds = found.unwrap_or([Vec3::splat(-0.5), Vec3::splat(0.5)]);
         let solid = |m: &Material| Material {
             double_sided: true,
             alpha: if m.alpha == AlphaMode::Blend { AlphaMode::Mask(0.5) } else { m.alpha },
             ..m.clone()
         };
-        Some(Self { bounds: [low, high], solid: materials.iter().map(solid).collect() })
+        Some(Self { bounds, solid: materials.iter().map(solid).collect() })
     }
 
     /// Half of the box's diagonal.

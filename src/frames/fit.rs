@@ -25,6 +25,17 @@ impl Span<'_> {
     }
 }
 
+/// Corners of a box that holds all that [`each_moment`] shows; not finite where that is nothing.
+pub(super) fn bounds(span: &Span, anchor: Option<(BoneId, DVec3)>, worker: &mut Worker) -> [Vec3; 2] {
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    each_moment(span, anchor, worker, |points| {
+        for p in points.iter().filter(|p| p.is_finite()) {
+            (low, high) = (low.min(*p), high.max(*p));
+        }
+    });
+    [low, high]
+}
+
 /// Vertices of all moments from which on several threads are worth their start.
 const PARALLEL: usize = 1 << 20;
 

@@ -6,7 +6,7 @@ use crate::asset::Asset;
 use crate::render::raster::Stats;
 use crate::scene::Camera;
 use crate::time;
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DAffine3, DVec3};
 
 /// Relative to the character's size, and to one for directions: what the eye takes for the same pose.
 const SAME: f64 = 2e-3;
@@ -22,12 +22,7 @@ pub fn ground_point(asset: &Asset, clip: Option<usize>) -> DVec3 {
     let mut worker = Worker::default();
     worker.evaluate(asset, clip, clip.map_or(0.0, |c| asset.character.clips()[c].playback().start));
     let center = asset.character.center(&worker.posed);
-    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    fit::each_moment(&Span { asset, clip, center }, None, &mut worker, |points| {
-        for p in points.iter().filter(|p| p.is_finite()) {
-            (low, high) = (low.min(*p), high.max(*p));
-        }
-    });
+    let [low, high] = fit::bounds(&Span { asset, clip, center }, None, &mut worker);
     if !low.is_finite() {
         return DVec3::ZERO;
     }

@@ -124,13 +124,8 @@ fn axis(span: &Span, view: &View, framing: &FramingDesc, worker: &mut Worker) ->
         (Pivot::At(p), _) => (p - span.center).as_vec3(),
         (Pivot::Middle, View::LookAt { target, .. }) => (*target - span.center).as_vec3(),
         (Pivot::Middle, _) => {
-            let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
             let anchor = framing.follow.map(|bone| (bone, worker.posed.origin(bone)));
-            fit::each_moment(span, anchor, worker, |points| {
-                for p in points.iter().filter(|p| p.is_finite()) {
-                    (low, high) = (low.min(*p), high.max(*p));
-                }
-            });
+            let [low, high] = fit::bounds(span, anchor, worker);
             let middle = (low + high) * 0.5;
             if middle.is_finite() { middle } else { Vec3::ZERO }
         }
