@@ -256,14 +256,14 @@ impl Character {
     ///
     /// # Panics
     /// If `instance`, `pose` or `posed` are not of this character.
-    pub fn follow(
+    pub fn deform_if_moved(
         &self,
         instance: usize,
         pose: &Pose,
         posed: &Posed,
         center: DVec3,
         scratch: &mut Scratch,
-        last: &mut Last,
+        last: &mut LastDeform,
         out: &mut Deformed,
     ) -> bool {
         let Scratch { morphed, palette } = scratch;
@@ -355,7 +355,7 @@ pub struct Scratch {
 
 /// What an instance was last deformed by; nothing at first.
 #[derive(Clone, Debug, Default)]
-pub struct Last {
+pub struct LastDeform {
     known: bool,
     palette: Vec<Affine3A>,
     weights: Vec<f32>,

@@ -2,7 +2,7 @@
 
 use super::effects::Effects;
 use crate::asset::Asset;
-use crate::character::{Last, Scratch};
+use crate::character::{LastDeform, Scratch};
 use crate::fk::{self, Posed};
 use crate::image::Image;
 use crate::pose::Pose;
@@ -18,7 +18,7 @@ pub struct Worker {
     pub(super) scratch: Scratch,
     pub(super) deformed: Vec<Deformed>,
     /// What `deformed` was made by, and for which shot.
-    last: Vec<Last>,
+    last: Vec<LastDeform>,
     shot: u64,
     pub(super) rasterizer: Rasterizer,
     pub(super) effects: Effects,
@@ -43,11 +43,11 @@ impl Worker {
             self.shot = shot;
             self.last.clear();
         }
-        self.last.resize_with(n, Last::default);
+        self.last.resize_with(n, LastDeform::default);
         let mut vertices = 0;
         for (i, (out, last)) in self.deformed.iter_mut().zip(&mut self.last).enumerate() {
             let Self { pose, posed, scratch, .. } = self;
-            if character.follow(i, pose, posed, center, scratch, last, out) {
+            if character.deform_if_moved(i, pose, posed, center, scratch, last, out) {
                 vertices += out.positions.len();
             }
         }
