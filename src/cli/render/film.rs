@@ -44,8 +44,13 @@ impl Job<'_> {
     pub fn draw(&self, moment: Moment, worker: &mut Worker) -> Rgba8 {
         let mut picture = Rgba8::default();
         let stats = self.shot.draw(moment, worker, &mut picture);
-        self.cost.lock().unwrap_or_else(|e| e.into_inner()).drawn += stats;
+        self.count(stats);
         picture
+    }
+
+    /// Count what drawing a part of a sheet cost.
+    pub fn count(&self, stats: FrameStats) {
+        self.cost.lock().unwrap_or_else(|e| e.into_inner()).drawn += stats;
     }
 
     /// Write a file of a sheet.

@@ -82,7 +82,7 @@ fn fill(
     let (scale, outlined) = (args.pixels.scale(), plan.job.art.as_ref().is_some_and(Painter::is_outlined));
     let one = |w: &mut Worker, f: &Frame| {
         let mut out = Channels::default();
-        plan.job.shot.draw_channels(f.moment, w, &channels, &mut out);
+        plan.job.count(plan.job.shot.draw_channels(f.moment, w, &channels, &mut out));
         if outlined {
             grow(&mut out);
         }
