@@ -86,6 +86,7 @@ impl Stage {
             style: Style::default(),
             background: self.background,
             objects,
+            shapes: &[],
             materials: &self.materials,
             textures: &self.textures,
         }
