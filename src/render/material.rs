@@ -107,6 +107,16 @@ pub(crate) fn light(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> (
     if m.unlit {
         return (k_d, alpha);
     }
+    let surface = lit(maps, m, p, k_d);
+    if !scene.style.is_plain() {
+        return (styled::light(isa, &surface, scene), alpha);
+    }
+    (shade::blinn_phong(&surface, scene.ambient, &scene.lights), alpha)
+}
+
+/// What the textures make of the coefficients.
+#[inline(always)]
+fn lit(maps: &Maps, m: &Material, p: &impl Points, k_d: V8) -> Surface<F8> {
     let (specular, shininess) = highlight(maps, m);
     let mut emissive = V8::splat(m.emissive);
     if let Some(t) = maps.texel(&m.emissive_map) {
@@ -116,20 +126,17 @@ pub(crate) fn light(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> (
         Some(t) => (t[0] + -1.0) * m.occlusion_strength + 1.0,
         None => F8::ONE,
     };
-    let surface = Surface {
+    Surface {
         position: p.position(),
         normal: normal(maps, m, p),
         view: p.view(),
+        ambient: m.ambient.map_or(k_d, V8::splat),
         diffuse: k_d,
         specular,
         shininess,
         openness,
         emissive,
-    };
-    if !scene.style.is_plain() {
-        return (styled::light(isa, &surface, scene), alpha);
     }
-    (shade::blinn_phong(&surface, scene.ambient, &scene.lights), alpha)
 }
 
 /// `k_s` and `p`.

@@ -9,12 +9,12 @@ use glam::Vec3;
 
 /// `emissive + k_d·I_a(n)·openness + Σ` what the lamps add.
 #[inline(never)]
-pub(crate) fn light(isa: Isa, surface: &Surface, scene: &Scene) -> V8 {
+pub(crate) fn light(isa: Isa, surface: &Surface<F8>, scene: &Scene) -> V8 {
     simd::run(isa, Styled { surface, scene })
 }
 
 struct Styled<'a> {
-    surface: &'a Surface,
+    surface: &'a Surface<F8>,
     scene: &'a Scene<'a>,
 }
 
@@ -32,7 +32,7 @@ impl Kernel for Styled<'_> {
             }
             None => above,
         };
-        let base = s.emissive + s.diffuse * ambient * s.openness;
+        let base = shade::unlit(s, ambient);
         match scene.style.toon {
             Some(steps) => base + toon(s, scene, steps),
             None => base + smooth(s, scene),
@@ -42,11 +42,11 @@ impl Kernel for Styled<'_> {
 
 /// `Σ I·reflected`, the key light where it arrives.
 #[inline(always)]
-fn smooth(s: &Surface, scene: &Scene) -> V8 {
+fn smooth(s: &Surface<F8>, scene: &Scene) -> V8 {
     let mut sum = V8::ZERO;
     for (i, light) in scene.lights.iter().enumerate() {
-        let a = shade::arrival(light, s.position);
-        let mut r = shade::reflected(s, a.towards);
+        let a = shade::arrival(&light.into(), s.position);
+        let mut r = shade::reflected(s, a.towards, true);
         if i == 0 {
             r = r * reach(s, scene, a.towards);
         }
@@ -60,10 +60,10 @@ const LIFT: f32 = 0.25;
 
 /// The diffuse term in steps, and highlights with an edge (see [`crate::scene::Style::toon`]).
 #[inline(always)]
-fn toon(s: &Surface, scene: &Scene, steps: u32) -> V8 {
+fn toon(s: &Surface<F8>, scene: &Scene, steps: u32) -> V8 {
     let (mut irradiance, mut highlight) = (V8::ZERO, V8::ZERO);
     for (i, light) in scene.lights.iter().enumerate() {
-        let a = shade::arrival(light, s.position);
+        let a = shade::arrival(&light.into(), s.position);
         let mut n_l = s.normal.dot(a.towards).max(F8::ZERO);
         if i == 0 {
             n_l = n_l * reach(s, scene, a.towards);
@@ -98,7 +98,7 @@ fn brightest(lights: &[Light]) -> Vec3 {
 
 /// The share of the key light that arrives, 0…1.
 #[inline(always)]
-fn reach(s: &Surface, scene: &Scene, towards: V8) -> F8 {
+fn reach(s: &Surface<F8>, scene: &Scene, towards: V8) -> F8 {
     match scene.style.shadow {
         Some(map) => unshadowed(map, s.position, s.normal.dot(towards)),
         None => F8::ONE,
