@@ -25,25 +25,13 @@ pub trait Real: Number + PartialOrd + Default + Send + Sync + 'static {
     /// Eight of them.
     type Wide: Lanes<Real = Self>;
     /// The largest relative error of an operation: half the distance from 1 to the next number.
-    const ROUNDOFF: Self;
-    /// No end.
-    const INFINITY: Self;
+    const ROUNDOFF: f64;
     /// The nearest number.
     fn of(x: f64) -> Self;
     /// As `f64`, exactly.
     fn wide(self) -> f64;
-    /// Square root.
-    fn sqrt(self) -> Self;
-    /// Absolute value.
-    fn abs(self) -> Self;
-    /// The smaller; the other one of a NaN.
-    fn min(self, other: Self) -> Self;
     /// The larger; the other one of a NaN.
     fn max(self, other: Self) -> Self;
-    /// The next number above.
-    fn next_up(self) -> Self;
-    /// The next number below.
-    fn next_down(self) -> Self;
 }
 
 /// Eight numbers.
@@ -88,8 +76,7 @@ macro_rules! real {
         }
         impl Real for $t {
             type Wide = $wide;
-            const ROUNDOFF: Self = 0.5 * $t::EPSILON;
-            const INFINITY: Self = $t::INFINITY;
+            const ROUNDOFF: f64 = 0.5 * $t::EPSILON as f64;
             #[inline(always)]
             fn of(x: f64) -> Self {
                 x as $t
@@ -99,28 +86,8 @@ macro_rules! real {
                 f64::from(self)
             }
             #[inline(always)]
-            fn sqrt(self) -> Self {
-                $t::sqrt(self)
-            }
-            #[inline(always)]
-            fn abs(self) -> Self {
-                $t::abs(self)
-            }
-            #[inline(always)]
-            fn min(self, other: Self) -> Self {
-                $t::min(self, other)
-            }
-            #[inline(always)]
             fn max(self, other: Self) -> Self {
                 $t::max(self, other)
-            }
-            #[inline(always)]
-            fn next_up(self) -> Self {
-                $t::next_up(self)
-            }
-            #[inline(always)]
-            fn next_down(self) -> Self {
-                $t::next_down(self)
             }
         }
         impl Number for $wide {
@@ -220,12 +187,6 @@ impl<T: Number> V3<T> {
             z: self.x * o.y - self.y * o.x,
         }
     }
-
-    /// Each component through a function.
-    #[inline(always)]
-    pub fn map<U>(self, f: impl Fn(T) -> U) -> V3<U> {
-        V3 { x: f(self.x), y: f(self.y), z: f(self.z) }
-    }
 }
 
 impl<R: Real> V3<R> {
@@ -245,31 +206,6 @@ impl<R: Real> V3<R> {
     #[inline(always)]
     pub fn wide(self) -> glam::DVec3 {
         glam::DVec3::new(self.x.wide(), self.y.wide(), self.z.wide())
-    }
-
-    /// To the nearest `f32`.
-    #[inline(always)]
-    pub fn narrow(self) -> glam::Vec3 {
-        self.wide().as_vec3()
-    }
-
-    /// `‖v‖`.
-    #[inline(always)]
-    pub fn length(self) -> R {
-        self.dot(self).sqrt()
-    }
-
-    /// `v / ‖v‖`; zero where there is no length.
-    #[inline(always)]
-    pub fn normalized(self) -> Self {
-        let l = self.length();
-        if l > R::ZERO { self * (R::ONE / l) } else { Self::ZERO }
-    }
-
-    /// The largest component.
-    #[inline(always)]
-    pub fn max_element(self) -> R {
-        self.x.max(self.y).max(self.z)
     }
 }
 

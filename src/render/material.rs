@@ -98,6 +98,26 @@ pub(crate) fn present(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) ->
     }
 }
 
+/// Alpha of what has any, 0…1.
+#[inline(always)]
+pub(crate) fn alpha(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> F8 {
+    diffuse(&Maps::new(isa, scene, m, p), m, p).1.clamp01()
+}
+
+/// What is to be lit, and alpha as in [`light`]; what is unlit shines by itself.
+#[inline(always)]
+pub(crate) fn surface(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> (Surface<F8>, F8) {
+    let maps = &Maps::new(isa, scene, m, p);
+    let (k_d, alpha) = diffuse(maps, m, p);
+    let alpha = if m.alpha == AlphaMode::Blend { alpha.clamp01() } else { F8::ONE };
+    let surface = lit(maps, m, p, k_d);
+    if m.unlit {
+        let (ambient, diffuse, specular) = (V8::ZERO, V8::ZERO, V8::ZERO);
+        return (Surface { ambient, diffuse, specular, emissive: k_d, ..surface }, alpha);
+    }
+    (surface, alpha)
+}
+
 /// Linear light, and alpha: 1 unless the material blends. Not multiplied.
 #[inline(always)]
 pub(crate) fn light(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> (V8, F8) {
@@ -109,7 +129,7 @@ pub(crate) fn light(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> (
     }
     let surface = lit(maps, m, p, k_d);
     if !scene.style.is_plain() {
-        return (styled::light(isa, &surface, scene), alpha);
+        return (styled::light(isa, &surface, scene, &[]), alpha);
     }
     (shade::blinn_phong(&surface, scene.ambient, &scene.lights), alpha)
 }

@@ -9,6 +9,7 @@ mod sample;
 mod shade;
 pub mod shadow;
 mod styled;
+mod varying;
 
 // A loop that counts lanes is what becomes one vector instruction; iterators do not always.
 #[allow(clippy::needless_range_loop)]

@@ -165,6 +165,23 @@ pub(crate) fn blinn_phong(s: &Surface<F8>, ambient: Vec3, lights: &[Light]) -> V
     sum
 }
 
+/// The same in either precision, with the share of each lamp's light that arrives.
+#[inline(always)]
+pub(crate) fn shadowed<L: Lanes>(
+    s: &Surface<L>,
+    ambient: V3<L>,
+    lamps: &[Lamp<L::Real>],
+    reached: &[V3<L>],
+    gated: bool,
+) -> V3<L> {
+    let mut sum = unlit(s, ambient);
+    for (lamp, &reached) in lamps.iter().zip(reached) {
+        let a = arrival(lamp, s.position);
+        sum = sum + a.intensity * (reflected(s, a.towards, gated) * reached);
+    }
+    sum
+}
+
 /// Turn normals to the side of the eye.
 #[inline(always)]
 pub(crate) fn facing(normal: V8, away: I8) -> V8 {

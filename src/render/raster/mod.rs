@@ -32,6 +32,7 @@ mod tile;
 mod vertex;
 mod window;
 
+pub use super::channel::IdImage;
 use super::channel::{Channel, Channels};
 use super::{Settings, Window};
 use crate::image::{Image, Rgba8};
@@ -45,21 +46,6 @@ use window::View;
 
 /// Pixels along a tile's side.
 pub(crate) const TILE: usize = 64;
-
-/// Object, triangle and depth of each pixel's centre, row by row from the top left.
-#[derive(Clone, Debug, PartialEq, Default)]
-pub struct IdImage {
-    /// Pixels a row.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// Index of the object plus one; 0 where nothing is.
-    pub objects: Vec<u32>,
-    /// Index of the triangle in its mesh; 0 where nothing is.
-    pub triangles: Vec<u32>,
-    /// Distance along the view direction, metres; infinite where nothing is.
-    pub depth: Vec<f32>,
-}
 
 /// What was done for a picture, counted exactly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
