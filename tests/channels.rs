@@ -26,6 +26,7 @@ fn draw(meshes: &[Mesh], samples: u8, threads: usize, isa: Isa) -> Channels {
         tangents: &[],
         material: 0,
         mirrored: false,
+        labels: &[],
     };
     let scene = Scene {
         camera,
