@@ -35,6 +35,7 @@ fn draw(meshes: &[Mesh], samples: u8, threads: usize, isa: Isa) -> Channels {
         style: Default::default(),
         background: [0.0; 4],
         objects: meshes.iter().map(object).collect(),
+        shapes: &[],
         materials: &[Material::default()],
         textures: &[],
     };

@@ -18,7 +18,7 @@ use sinew::scene::{Light, LightKind, Lighting, Material, MaterialPatch, Scene, S
 use std::collections::BTreeSet;
 
 fn sun(direction: Vec3) -> Light {
-    Light { kind: LightKind::Directional { direction: direction.normalize() }, color: Vec3::ONE }
+    Light::new(LightKind::Directional { direction: direction.normalize() }, Vec3::ONE)
 }
 
 /// A ball of radius 1 around the origin with a ball's normals.

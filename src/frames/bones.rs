@@ -94,10 +94,11 @@ impl Figure {
         };
         Scene {
             ambient: Vec3::splat(0.3),
-            lights: vec![Light { kind: LightKind::Directional { direction }, color: Vec3::splat(0.85) }],
+            lights: vec![Light::new(LightKind::Directional { direction }, Vec3::splat(0.85))],
             style: Style::default(),
             background: [0.0; 4],
             objects: vec![object],
+            shapes: &[],
             materials: &*MATERIALS,
             textures: &[],
             ..of_character

@@ -145,7 +145,7 @@ fn of_asset(mounted: &[MountedLight], posed: &Posed, center: DVec3, camera: &Cam
     }
     let lamp = |from: Vec3, color: Vec3| {
         let direction = -camera.scene_from_view.transform_vector3(from.normalize());
-        Light { kind: LightKind::Directional { direction }, color }
+        Light::new(LightKind::Directional { direction }, color)
     };
     let key = lamp(Vec3::new(-0.55, 0.75, 0.65), Vec3::new(0.92, 0.9, 0.86));
     let fill = lamp(Vec3::new(0.9, 0.15, 0.5), Vec3::new(0.2, 0.22, 0.26));

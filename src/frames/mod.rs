@@ -310,6 +310,7 @@ impl<'a> Shot<'a> {
             style: lit.style,
             background: look.background,
             objects: character.instances().iter().zip(deformed).enumerate().map(object).collect(),
+            shapes: &[],
             materials: &self.materials,
             textures: &self.asset.textures,
         }

@@ -260,7 +260,7 @@ fn lamp(place: &str, doc: &LampDoc) -> Result<Lamp, LookError> {
         Some(FrameDoc::Camera) => LampFrame::Camera,
         _ => LampFrame::World,
     };
-    Ok(Lamp { light: Light { kind, color: color * intensity }, frame })
+    Ok(Lamp { light: Light::new(kind, color * intensity), frame })
 }
 
 fn spot(place: &str, doc: &LampDoc) -> Result<LightKind, LookError> {

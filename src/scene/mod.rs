@@ -7,6 +7,7 @@ mod material;
 mod mips;
 mod patch;
 mod shadow;
+mod shape;
 mod style;
 pub(crate) mod texels;
 mod texture;
@@ -17,6 +18,7 @@ pub use lighting::{Lamp, LampFrame, Lighting};
 pub use material::{AlphaMode, Material, TextureRef};
 pub use patch::MaterialPatch;
 pub use shadow::ShadowMap;
+pub use shape::{Geometry, Pinhole, Shape, ShapeLight, ShapeMaterial, ShapeScene, Soup, Source};
 pub use style::Style;
 pub use texture::{Content, Filter, Texture, TextureError, TextureId, WrapMode};
 
@@ -66,6 +68,8 @@ pub struct Scene<'a> {
     pub background: [f32; 4],
     /// Surfaces.
     pub objects: Vec<Object<'a>>,
+    /// Surfaces without a mesh: rays meet them, the rasterizer does not draw them.
+    pub shapes: &'a [Shape],
     /// What surfaces are made of.
     pub materials: &'a [Material],
     /// What materials refer to.

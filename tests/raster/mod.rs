@@ -87,6 +87,7 @@ impl Stage {
             style: Style::default(),
             background: self.background,
             objects,
+            shapes: &[],
             materials: &self.materials,
             textures: &self.textures,
         }

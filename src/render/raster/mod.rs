@@ -115,7 +115,7 @@ impl std::ops::AddAssign for Stats {
 /// let camera = Camera::look_at(Vec3::Z * 3.0, Vec3::ZERO, Vec3::Y, Projection::Orthographic { height: 1.0 });
 /// let scene = Scene {
 ///     camera: camera.unwrap(), ambient: Vec3::ONE, lights: vec![], style: Default::default(), background: [0.0; 4],
-///     objects: vec![object], materials: &[Material::default()], textures: &[],
+///     objects: vec![object], shapes: &[], materials: &[Material::default()], textures: &[],
 /// };
 /// let mut picture = Rgba8::default();
 /// let settings = Settings { width: 4, height: 4, samples: 4, threads: 1 };
