@@ -16,6 +16,7 @@ mod stroke;
 mod view;
 mod worker;
 
+pub use channels::Extent;
 pub use framing::{Framing, Turns};
 pub use look::{GroundLook, Look, Shading, Shadows};
 pub use ordered::{Stop, in_order, in_order_pairs};
