@@ -16,6 +16,7 @@ mod stroke;
 mod view;
 mod worker;
 
+pub use channels::Extent;
 pub use framing::{Framing, Turns};
 pub use look::{GroundLook, Look, Shading, Shadows};
 pub use ordered::{Stop, in_order, in_order_pairs};
@@ -39,6 +40,7 @@ use fit::Span;
 use glam::DVec3;
 use overlay::Layers;
 use stand::Stand;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
@@ -113,6 +115,8 @@ pub struct Shot<'a> {
     /// What the look needs beside the scene itself.
     stage: Option<Stage>,
     developer: Developer,
+    /// For each instance the bones, from 1, that its vertices follow most; made when they are asked for.
+    labels: OnceLock<Vec<Vec<u32>>>,
 }
 
 /// What a frame cost.
@@ -173,8 +177,8 @@ impl<'a> Shot<'a> {
         let layers = Layers::new(&span, &desc.overlays, &mut worker)?;
         let developer = desc.look.grade.developer();
         static SHOTS: AtomicU64 = AtomicU64::new(1);
-        let number = SHOTS.fetch_add(1, Ordering::Relaxed);
-        Ok(Self { number, asset, desc, stand, range, materials, center, stage, layers, developer })
+        let (number, labels) = (SHOTS.fetch_add(1, Ordering::Relaxed), OnceLock::new());
+        Ok(Self { number, asset, desc, stand, range, materials, center, stage, layers, developer, labels })
     }
 
     /// What was asked for.
@@ -284,7 +288,8 @@ impl<'a> Shot<'a> {
     fn scene<'s>(&'s self, camera: Camera, posed: &Posed, deformed: &'s [Deformed]) -> Scene<'s> {
         let character = &self.asset.character;
         let plain = self.materials.len() - 1;
-        let object = |(inst, d): (&Instance, &'s Deformed)| {
+        let labels = self.labels.get();
+        let object = |(i, (inst, d)): (usize, (&Instance, &'s Deformed))| {
             let mesh = &character.meshes()[inst.mesh.0 as usize];
             let material = mesh.material.map_or(plain, |m| (m.0 as usize).min(plain));
             Object {
@@ -294,6 +299,7 @@ impl<'a> Shot<'a> {
                 tangents: &d.tangents,
                 material,
                 mirrored: d.mirrored,
+                labels: labels.map_or(&[], |l| &l[i]),
             }
         };
         let look = &self.desc.look;
@@ -304,7 +310,7 @@ impl<'a> Shot<'a> {
             lights: lit.lights,
             style: lit.style,
             background: look.background,
-            objects: character.instances().iter().zip(deformed).map(object).collect(),
+            objects: character.instances().iter().zip(deformed).enumerate().map(object).collect(),
             shapes: &[],
             materials: &self.materials,
             textures: &self.asset.textures,

@@ -40,6 +40,17 @@ pub struct Object<'a> {
     pub material: usize,
     /// Triangles wind the other way round (a mirroring transform).
     pub mirrored: bool,
+    /// Numbers that tell parts of the surface apart, 0 for none: one a vertex, one for all of them, or an empty list. What they mean is
+    /// for the scene's maker to say; only channels show them.
+    pub labels: &'a [u32],
+}
+
+impl Object<'_> {
+    /// The label of a vertex.
+    pub fn label(&self, vertex: u32) -> u32 {
+        let only = if self.labels.len() == 1 { 0 } else { vertex as usize };
+        self.labels.get(only).copied().unwrap_or(0)
+    }
 }
 
 /// Everything that a renderer reads.

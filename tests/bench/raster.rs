@@ -47,6 +47,7 @@ fn main() {
             tangents: &[],
             material: 0,
             mirrored: false,
+            labels: &[],
         };
         let light =
             Light::new(LightKind::Point { position: Vec3::new(3.0, 5.0, 4.0), falloff: None }, Vec3::ONE);

@@ -77,6 +77,7 @@ impl Stage {
                 tangents: &mesh.tangents,
                 material: *material,
                 mirrored: false,
+                labels: &[],
             });
         }
         Scene {

@@ -1,5 +1,6 @@
 //! Frames into files: drawn and encoded by workers, written in order.
 
+use super::channels::Beside;
 use super::sheet::Painter;
 use super::time::Frame;
 use crate::cli::{Failure, say::Say};
@@ -8,8 +9,9 @@ use sinew::image::{Image, Rgba8};
 use sinew::io::manifest::sha256;
 use sinew::io::picture::{
     self, AtomicFile, Coding, Dither, ExrDepth, Film, FilmWriter, Folder, Format, FrameEncoder, Output,
-    Palette, PngLevel, Target, choose_dither, encode_exr, encode_png, encode_webp,
+    Palette, PngLevel, Target, choose_dither, encode_exr_layers, encode_png, encode_webp,
 };
+use sinew::render::channel::Channels;
 use sinew::time::Rate;
 use std::io::Write;
 use std::path::Path;
@@ -31,6 +33,8 @@ pub struct Job<'a> {
     pub force: bool,
     /// Compute hashes.
     pub hash: bool,
+    /// What is written beside each picture.
+    pub beside: Beside,
     /// Frames become pixel art; they are drawn before nothing then.
     pub art: Option<Painter>,
     /// Pixels of a finished frame for each one that is drawn, across and down.
@@ -93,11 +97,14 @@ pub fn write(job: &Job, say: &Say) -> Result<Written, Failure> {
             let message = "--pixel-art: OpenEXR has no palette; expected a name that ends in .png, .webp, .gif or .apng";
             return Err(Failure::Usage(message.into()));
         }
-        Format::Exr => stills(job, say, shoot_linear, |p| encode_exr(p, ExrDepth::Float)),
-        Format::Webp => stills(job, say, shoot, encode_webp),
+        Format::Exr => {
+            let layers = |seen: &Channels| job.beside.layers(seen);
+            stills(job, say, shoot_linear, |p, seen| encode_exr_layers(p, ExrDepth::Float, &layers(seen)))
+        }
+        Format::Webp => stills(job, say, shoot, |p, _| encode_webp(p)),
         _ => match &job.art {
-            Some(art) => stills(job, say, shoot, |p| art.encode_png(p, job.level)),
-            None => stills(job, say, shoot, |p| encode_png(p, job.level)),
+            Some(art) => stills(job, say, shoot, |p, _| art.encode_png(p, job.level)),
+            None => stills(job, say, shoot, |p, _| encode_png(p, job.level)),
         },
     };
     let written = match drawn {
@@ -137,7 +144,8 @@ fn refuse_existing(job: &Job) -> Result<(), Failure> {
     }
     for frame in job.frames {
         let Some(path) = job.target.path_of(frame.number) else { continue };
-        if path.exists() {
+        let beside = job.beside.files(&path);
+        if let Some(path) = [path].iter().chain(&beside).find(|p| p.exists()) {
             let message = format!("{}: the file exists; --force overwrites it", path.display());
             return Err(Failure::Run(message));
         }
@@ -168,7 +176,7 @@ fn shoot_linear(job: &Job, moment: Moment, worker: &mut Worker) -> (Image, Frame
 fn draw<P: Send + Sync, S, T: Send>(
     job: &Job,
     frames: &[Frame],
-    shoot: Shoot<P>,
+    shoot: impl Fn(&Job, Moment, &mut Worker) -> (P, FrameStats) + Sync,
     state: impl Fn() -> S + Sync,
     encode: impl Fn(&mut S, Option<&P>, &P) -> T + Sync,
     mut receive: impl FnMut(&mut Written, usize, T) -> Result<(), picture::Error>,
@@ -206,25 +214,41 @@ fn stills<P: Send + Sync>(
     job: &Job,
     say: &Say,
     shoot: Shoot<P>,
-    encode: impl Fn(&P) -> Result<Vec<u8>, picture::Error> + Sync,
+    encode: impl Fn(&P, &Channels) -> Result<Vec<u8>, picture::Error> + Sync,
 ) -> Result<Written, Fault> {
+    let wanted = job.beside.wanted();
+    let both = |job: &Job, moment: Moment, worker: &mut Worker| {
+        let (picture, mut stats) = shoot(job, moment, worker);
+        let mut seen = Channels::default();
+        if !wanted.is_empty() {
+            stats += job.shot.draw_channels(moment, worker, &wanted, &mut seen);
+        }
+        ((picture, seen), stats)
+    };
     let folder = if matches!(job.target, Target::Sequence(..)) { Folder::Create } else { Folder::MustExist };
     let bar = say.progress(job.frames.len());
-    let encode = |(): &mut (), _: Option<&P>, picture: &P| {
-        encode(picture).map(|bytes| (job.hash.then(|| sha256(&bytes)), bytes))
+    let encode = |(): &mut (), _: Option<&(P, Channels)>, (picture, seen): &(P, Channels)| {
+        let bytes = encode(picture, seen)?;
+        Ok((job.hash.then(|| sha256(&bytes)), bytes, job.beside.encode_all(job.target.format(), seen)?))
     };
     let written = draw(
         job,
         job.frames,
-        shoot,
+        both,
         || (),
         encode,
-        |written, i, result| {
-            let (hash, bytes) = result?;
+        |written, i, result: Result<_, picture::Error>| {
+            let (hash, bytes, beside) = result?;
             written.hashes.extend(hash);
             written.bytes += bytes.len() as u64;
             match job.target.path_of(job.frames[i].number) {
-                Some(path) => AtomicFile::write(path, &bytes, job.force, folder)?,
+                Some(path) => {
+                    for (name, bytes) in &beside {
+                        written.bytes += bytes.len() as u64;
+                        AtomicFile::write(name.file(&path), bytes, job.force, folder)?;
+                    }
+                    AtomicFile::write(path, &bytes, job.force, folder)?
+                }
                 None => {
                     let mut out = Output::stdout(false);
                     out.write_all(&bytes).map_err(|source| picture::Error::Stdout { source })?;

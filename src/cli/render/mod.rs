@@ -3,6 +3,7 @@
 mod batch;
 mod bone;
 mod camera;
+mod channels;
 mod film;
 mod look;
 mod output;
@@ -12,6 +13,7 @@ mod stats;
 mod time;
 
 use super::{Failure, print, say, say::Say};
+use channels::Beside;
 use film::{Job, Written};
 use sinew::asset::Asset;
 use sinew::frames::{Look, Shot, ShotDesc};
@@ -64,6 +66,8 @@ pub struct Args {
     #[command(flatten)]
     overlay: overlay::OverlayArgs,
     #[command(flatten)]
+    channels: channels::ChannelArgs,
+    #[command(flatten)]
     sheet: sheet::SheetArgs,
     #[command(flatten)]
     batch: batch::BatchArgs,
@@ -98,6 +102,8 @@ fn plan(args: &Args, task: &Task) -> Result<Plan, Failure> {
     let one_picture = args.sheet.is_one_picture();
     let alone = !task.target.takes_a_clip() && !one_picture;
     let frames = args.time.frames(task.input, range, alone, args.camera.turntable)?;
+    let single = !one_picture && !args.sheet.pixels.is_on() && !task.target.is_film(frames.len());
+    args.channels.check(task.target, single)?;
     if !one_picture {
         task.target.check_frames(frames.len()).map_err(|e| Failure::Usage(e.to_string()))?;
     }
@@ -151,6 +157,9 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
     let shot = Shot::new(asset, desc).map_err(|e| Failure::Usage(e.to_string()))?;
     totals.framing += start.elapsed();
     let moments = args.sheet.contact_frames(&shot);
+    let bones = character.skeleton();
+    let bones = bones.ids().map(|b| bones.name(b).to_string()).collect();
+    let beside = Beside::new(&args.channels, &shot, bones, args.output.png);
     let mut job = Job {
         shot: &shot,
         frames: moments.as_ref().unwrap_or(&plan.frames),
@@ -162,6 +171,7 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         // A sheet of which a part is there already is drawn again as a whole.
         force: args.output.force || (one_picture && args.batch.skip_existing),
         hash: args.batch.manifest.is_some(),
+        beside,
         art: None,
         cost: Default::default(),
         scale: args.sheet.pixels.scale(),

@@ -96,7 +96,7 @@ impl std::ops::AddAssign for Stats {
 /// let positions = vec![Vec3::new(-2.0, -2.0, 0.0), Vec3::new(2.0, -2.0, 0.0), Vec3::new(0.0, 4.0, 0.0)];
 /// let mesh = Mesh::new(MeshData { positions, triangles: vec![[0, 1, 2]], ..Default::default() }).unwrap();
 /// let object = Object {
-///     mesh: &mesh, positions: &mesh.positions, normals: &[], tangents: &[], material: 0, mirrored: false,
+///     mesh: &mesh, positions: &mesh.positions, normals: &[], tangents: &[], material: 0, mirrored: false, labels: &[],
 /// };
 /// let camera = Camera::look_at(Vec3::Z * 3.0, Vec3::ZERO, Vec3::Y, Projection::Orthographic { height: 1.0 });
 /// let scene = Scene {
@@ -198,6 +198,9 @@ impl Rasterizer {
         view.cut(1, &mut out.objects);
         view.cut(1, &mut out.depth);
         view.cut(1, &mut out.normals);
+        view.cut(1, &mut out.labels);
+        view.cut(1, &mut out.positions);
+        view.cut(1, &mut out.uvs);
         [out.width, out.height] = view.size();
         stats
     }

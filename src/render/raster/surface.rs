@@ -3,7 +3,8 @@
 use super::frame::{Class, Draw, Frame, Projector};
 use super::resolve;
 use crate::math::simd::{self, F8, I8, Kernel, V8};
-use crate::render::material;
+use crate::render::material::{self, Points};
+use crate::render::sample::Uv;
 use crate::render::varying::{self, Slopes, Varying, corners, mix, vectors};
 use glam::Vec4;
 
@@ -137,8 +138,8 @@ impl<const ONE: bool> Kernel for Shade<'_, ONE> {
     }
 }
 
-/// Eight points whose normals are asked for.
-pub(super) struct Normals<'a> {
+/// Eight points that are asked what is there, beside its light.
+pub(super) struct Look<'a> {
     pub frame: &'a Frame<'a>,
     pub draw: &'a Draw<'a>,
     /// Triangles, counted in the draw.
@@ -148,21 +149,35 @@ pub(super) struct Normals<'a> {
     pub py: F8,
 }
 
-impl Normals<'_> {
+/// What [`Look`] finds.
+pub(super) struct Found {
     /// Unit shading normals, scene space.
-    pub fn find(self) -> V8 {
+    pub normal: V8,
+    /// Scene space.
+    pub position: V8,
+    /// Coordinates of the first set; zero where there is none.
+    pub uv: [F8; 2],
+    /// The corners' vertices, and the points' barycentric coordinates.
+    pub corner: [[u32; 8]; 3],
+    pub b: [F8; 3],
+}
+
+impl Look<'_> {
+    pub fn find(self) -> Found {
         simd::run(self.frame.isa, self)
     }
 }
 
-impl Kernel for Normals<'_> {
-    type Output = V8;
+impl Kernel for Look<'_> {
+    type Output = Found;
 
     #[inline(always)]
-    fn run(self) -> V8 {
+    fn run(self) -> Found {
         let Self { frame, draw, ids, px, py } = self;
         let seen = seen::<false>(frame, draw, ids, &[Vec4::ZERO; 3], px, py);
-        material::shading_normal(frame.isa, frame.scene, draw.material, &seen)
+        let normal = material::shading_normal(frame.isa, frame.scene, draw.material, &seen);
+        let Uv { u, v, .. } = seen.uv(0);
+        Found { normal, position: seen.position, uv: [u, v], corner: seen.corner, b: seen.b }
     }
 }
 
