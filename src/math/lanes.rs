@@ -7,6 +7,8 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 /// What has the four operations.
 pub trait Number:
     Copy
+    + Send
+    + Sync
     + Debug
     + Add<Output = Self>
     + Sub<Output = Self>
@@ -21,7 +23,7 @@ pub trait Number:
 }
 
 /// `f32` or `f64`.
-pub trait Real: Number + PartialOrd + Default + Send + Sync + 'static {
+pub trait Real: Number + PartialOrd + Default + 'static {
     /// Eight of them.
     type Wide: Lanes<Real = Self>;
     /// The largest relative error of an operation: half the distance from 1 to the next number.

@@ -86,6 +86,11 @@ impl Accel {
         Self { isa, ..self }
     }
 
+    /// The triangles, as they were given.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
     /// Corner of the box with the smallest coordinates, and with the largest; `None` without triangles.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
         (!self.triangles.is_empty()).then_some((self.span.lo, self.span.hi))
