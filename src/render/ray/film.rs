@@ -1,6 +1,5 @@
 //! Where samples are gathered: tiles, from the middle of the picture outwards, pass by pass.
 
-use super::eye::Eye;
 use super::sampler;
 use super::stage::{Hit, Real, Stage};
 use super::wave::{Here, Path, Wave};
@@ -144,7 +143,7 @@ impl Tile {
                 0 | 1 => [0.5; 2],
                 _ => sampler::sample(settings.seed, [x as u32, y as u32], index, 0),
             };
-            wave.paths.push(kept::<R>(&stage.eye, [x as f64 + dx, y as f64 + dy], place));
+            wave.paths.push(stage.eye.path([x as f64 + dx, y as f64 + dy], place as u32));
         }
         let here = Here { settings, corner: self.corner, width, index };
         wave.run(stage, here, |path| known(stage, path, pixel(path.place as usize)));
@@ -177,12 +176,6 @@ impl Tile {
             self.active[p] = near.any(|q| open[q]);
         }
     }
-}
-
-/// A ray from the eye, in the numbers that it is traced in.
-pub(super) fn kept<R: Real>(eye: &Eye, at: [f64; 2], place: usize) -> Path {
-    let path = eye.path(at, place as u32);
-    Path { origin: R::kept(path.origin), direction: R::kept(path.direction), ..path }
 }
 
 /// Goes on to the end.

@@ -14,7 +14,7 @@ use std::cell::Cell;
 
 /// What rays and shading are computed in.
 pub(super) trait Real: lanes::Real + accel::Real {
-    /// As it is stored.
+    /// As rays through triangles have it.
     fn kept(v: DVec3) -> DVec3 {
         V3::<Self>::of(v).wide()
     }
@@ -261,11 +261,12 @@ impl<'a, R: Real> Stage<'a, R> {
     /// The first surface on a path that the eye would see there, not beyond `far`; with what blends, or without.
     pub fn nearest(&self, path: &Path, far: f64, blends: bool) -> Option<Hit> {
         let ray = self.ray(path.origin, path.direction, path.near, far);
+        let line = [path.origin, path.direction].map(R::kept);
         let seen = |h: &accel::Hit<R>| {
             let body = &self.bodies[h.object as usize];
             !(body.culled && h.back)
                 && body.corners(h.triangle).iter().all(|p| p.is_finite())
-                && (path.left == NOTHING || body.ahead(h.triangle, [path.origin, path.direction]))
+                && (path.left == NOTHING || body.ahead(h.triangle, line))
                 && match body.finish.alpha {
                     Alpha::Mask(cut_off) => self.coat.alpha(self.isa, body, &(*h).into()) >= cut_off,
                     Alpha::Blend => blends,
@@ -281,6 +282,7 @@ impl<'a, R: Real> Stage<'a, R> {
     /// let theirs through, straight on.
     pub fn passing(&self, origin: DVec3, direction: DVec3, far: f64, left: u32) -> DVec3 {
         let ray = self.ray(origin, direction, 0.0, far);
+        let line = [origin, direction].map(R::kept);
         let passed = Cell::new(DVec3::ONE);
         let stops = |finish: &Finish, alpha: &dyn Fn() -> f64| {
             if finish.is_glass() {
@@ -298,13 +300,13 @@ impl<'a, R: Real> Stage<'a, R> {
         };
         let blocked = self.world.blocked(&ray, |h| {
             let body = &self.bodies[h.object as usize];
-            body.ahead(h.triangle, [origin, direction])
+            body.ahead(h.triangle, line)
                 && stops(&body.finish, &|| self.coat.alpha(self.isa, body, &(*h).into()))
         });
         let hidden = blocked
             || self.solids.iter().enumerate().any(|(i, (geometry, finish))| {
                 let own = left as usize == self.bodies.len() + i;
-                let met = solid::meet(geometry, [origin, direction], own, [0.0, far]).is_some();
+                let met = solid::meet(geometry, [origin, direction], own, [f64::MIN_POSITIVE, far]).is_some();
                 met && stops(finish, &|| self.coat.solid_alpha(finish.material))
             });
         if hidden { DVec3::ZERO } else { passed.get() }
@@ -340,9 +342,9 @@ impl<'a, R: Real> Stage<'a, R> {
 
 impl Spot {
     /// A start for rays that leave along `direction`: off the surface by the error bound, on that side.
-    pub fn leave<R: Real>(&self, direction: DVec3) -> DVec3 {
+    pub fn leave(&self, direction: DVec3) -> DVec3 {
         let side = self.error.copysign(self.face.dot(direction));
-        R::kept(self.position + self.face * side)
+        self.position + self.face * side
     }
 }
 

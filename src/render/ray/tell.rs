@@ -1,7 +1,6 @@
 //! What pixels show beside their colour.
 
 use super::ShapeCast;
-use super::film::kept;
 use super::stage::{Hit, Real, Stage};
 use super::wave::Path;
 use crate::render::channel::{Channel, Channels};
@@ -19,7 +18,7 @@ pub(super) fn cast<R: Real>(stage: &Stage<R>, window: Window, focal: f64, out: &
     let shapes = stage.solids.len() as u32;
     for at in 0..n {
         let pixel = [window.x + at % window.width, window.y + at / window.width];
-        let path = kept::<R>(&stage.eye, pixel.map(|x| x as f64 + 0.5), at);
+        let path = stage.eye.path(pixel.map(|x| x as f64 + 0.5), at as u32);
         let Some(hit) = stage.nearest(&path, f64::INFINITY, true) else { continue };
         // Bodies come first here, shapes there.
         let bodies = stage.bodies.len() as u32;

@@ -173,8 +173,8 @@ impl Wave {
                 settings,
                 Path {
                     bounce: path.bounce + 1,
-                    origin: spot.leave::<R>(direction),
-                    direction: R::kept(direction),
+                    origin: spot.leave(direction),
+                    direction,
                     near: 0.0,
                     weight,
                     cover,
@@ -282,9 +282,9 @@ fn arriving<R: Real>(
         return DVec3::ZERO;
     }
     count.shadow += 1;
-    let origin = spot.leave::<R>(direction);
+    let origin = spot.leave(direction);
     let direction = if far < f64::INFINITY { direction + (spot.position - origin) } else { direction };
-    stage.passing(origin, R::kept(direction), far, hit.object)
+    stage.passing(origin, direction, far, hit.object)
 }
 
 /// From the unit square onto the unit disc, areas kept (Shirley and Chiu 1997).
