@@ -189,7 +189,10 @@ pub fn from_bytes(bytes: &[u8]) -> Result<LookFile, LookError> {
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let doc: Document = serde_json::from_slice(text)?;
     if doc.sinew_look.is_none() {
-        return Err(LookError::value("the look", "missing field `sinew_look`: expected the format's version, 1"));
+        return Err(LookError::value(
+            "the look",
+            "missing field `sinew_look`: expected the format's version, 1",
+        ));
     }
     read(doc)
 }
