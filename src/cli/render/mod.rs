@@ -16,7 +16,7 @@ use super::{Failure, print, say, say::Say};
 use channels::Beside;
 use film::{Job, Written};
 use sinew::asset::Asset;
-use sinew::frames::{Look, Shot, ShotDesc};
+use sinew::frames::{Look, Props, Shot, ShotDesc};
 use sinew::io::Import;
 use sinew::io::picture::{Format, Target};
 use sinew::io::scene::{Setting, ours::SceneFile};
@@ -99,6 +99,10 @@ fn scene(import: &Import) -> Option<&SceneFile> {
     }
 }
 
+fn props(scene: &SceneFile) -> Props {
+    Props { shapes: scene.shapes.clone(), materials: scene.materials.clone() }
+}
+
 /// Which pictures an output consists of.
 struct Plan {
     frames: Vec<Frame>,
@@ -155,6 +159,7 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         view: args.sheet.view(args.camera.view(asset, scene)?, args.camera.is_default()),
         framing: args.camera.framing(asset)?,
         look: args.look.look(asset, scene.map(|s| &s.look), |m| say.warn(m))?,
+        props: scene.map(props).unwrap_or_default(),
         overlays,
         crop: args.camera.crop([settings.width, settings.height])?,
         settings,
