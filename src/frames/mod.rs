@@ -32,7 +32,7 @@ use crate::image::develop::Developer;
 use crate::image::{Image, Rgba8};
 use crate::render::raster::{IdImage, Stats};
 use crate::render::{Settings, Window};
-use crate::scene::{Camera, Material, Object, Scene};
+use crate::scene::{Camera, Material, Object, Scene, Shape};
 use crate::skin::Deformed;
 use crate::time::{self, Range, Wrap};
 use effects::Stage;
@@ -57,6 +57,8 @@ pub struct ShotDesc {
     pub framing: FramingDesc,
     /// Light and background.
     pub look: Look,
+    /// What stands around the character.
+    pub props: Props,
     /// What is drawn with the character.
     pub overlays: Overlays,
     /// Size and samples of the pictures.
@@ -74,11 +76,21 @@ impl Default for ShotDesc {
             view: View::default(),
             framing: FramingDesc::default(),
             look: Look::default(),
+            props: Props::default(),
             overlays: Overlays::default(),
             settings: Settings::default(),
             crop: None,
         }
     }
+}
+
+/// Shapes around a character, world space, and what they are made of. The rasterizer does not draw them.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Props {
+    /// Spheres, planes and triangles; their materials index `materials`.
+    pub shapes: Vec<Shape>,
+    /// Not touched by the look.
+    pub materials: Vec<Material>,
 }
 
 /// One picture of a shot.
@@ -108,8 +120,10 @@ pub struct Shot<'a> {
     stand: Stand<'a>,
     layers: Layers,
     range: Range,
-    /// The asset's materials, and the one that meshes without a material wear.
+    /// The asset's materials, the one that meshes without a material wear, and those of the props.
     materials: Vec<Material>,
+    /// The props, scene space.
+    shapes: Vec<Shape>,
     /// The world point that the scene's frame has its origin at.
     center: DVec3,
     /// What the look needs beside the scene itself.
@@ -165,20 +179,37 @@ impl<'a> Shot<'a> {
     /// # Panics
     /// If the asset has no such clip.
     pub fn new(asset: &'a Asset, desc: ShotDesc) -> Result<Self, ViewError> {
-        let materials = look::materials(asset, &desc.look);
+        let mut materials = look::materials(asset, &desc.look);
+        let own = materials.len();
+        materials.extend(desc.props.materials.iter().cloned());
         let aspect = aspect(&desc.settings);
         let range = desc.clip.map(|c| asset.character.clips()[c].playback()).unwrap_or_default();
         let mut worker = Worker::default();
         worker.evaluate(asset, desc.clip, range.start);
         let center = asset.character.center(&worker.posed);
         let span = Span { asset, clip: desc.clip, center };
+        let placed = |s: &Shape| Shape { geometry: s.geometry.moved(-center), material: own + s.material };
+        let shapes = desc.props.shapes.iter().map(placed).collect();
         let stand = Stand::new(&span, &desc.view, desc.framing, aspect, &mut worker)?;
         let stage = Stage::new(&span, &desc.look, &materials, &mut worker);
         let layers = Layers::new(&span, &desc.overlays, &mut worker)?;
         let developer = desc.look.grade.developer();
         static SHOTS: AtomicU64 = AtomicU64::new(1);
         let (number, labels) = (SHOTS.fetch_add(1, Ordering::Relaxed), OnceLock::new());
-        Ok(Self { number, asset, desc, stand, range, materials, center, stage, layers, developer, labels })
+        Ok(Self {
+            number,
+            asset,
+            desc,
+            stand,
+            range,
+            materials,
+            shapes,
+            center,
+            stage,
+            layers,
+            developer,
+            labels,
+        })
     }
 
     /// What was asked for.
@@ -287,7 +318,7 @@ impl<'a> Shot<'a> {
 
     fn scene<'s>(&'s self, camera: Camera, posed: &Posed, deformed: &'s [Deformed]) -> Scene<'s> {
         let character = &self.asset.character;
-        let plain = self.materials.len() - 1;
+        let plain = self.asset.materials.len();
         let labels = self.labels.get();
         let object = |(i, (inst, d)): (usize, (&Instance, &'s Deformed))| {
             let mesh = &character.meshes()[inst.mesh.0 as usize];
@@ -311,7 +342,7 @@ impl<'a> Shot<'a> {
             style: lit.style,
             background: look.background,
             objects: character.instances().iter().zip(deformed).enumerate().map(object).collect(),
-            shapes: &[],
+            shapes: &self.shapes,
             materials: &self.materials,
             textures: &self.asset.textures,
         }

@@ -23,6 +23,17 @@ pub enum Geometry {
     Triangle([DVec3; 3]),
 }
 
+impl Geometry {
+    /// The same elsewhere.
+    pub fn moved(self, by: DVec3) -> Self {
+        match self {
+            Self::Sphere { center, radius } => Self::Sphere { center: center + by, radius },
+            Self::Plane { point, normal } => Self::Plane { point: point + by, normal },
+            Self::Triangle(corners) => Self::Triangle(corners.map(|c| c + by)),
+        }
+    }
+}
+
 /// A surface without a mesh, and what it is made of.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shape {

@@ -5,6 +5,7 @@ use crate::cli::Failure;
 use glam::DVec3;
 use sinew::asset::Asset;
 use sinew::frames::{FramingDesc, Pivot, Turns, View};
+use sinew::io::scene::ours::{self, SceneFile};
 use sinew::render::Window;
 
 /// Height of the film that `focal` speaks of, millimetres: still photography's 36 × 24.
@@ -65,8 +66,14 @@ struct Orbit {
 }
 
 impl CameraArgs {
-    /// Which camera films.
-    pub fn view(&self, asset: &Asset) -> Result<View, Failure> {
+    /// Which camera films: the scene's, unless options name one.
+    pub fn view(&self, asset: &Asset, scene: Option<&SceneFile>) -> Result<View, Failure> {
+        if let Some(view) = scene.and_then(|s| s.camera).filter(|_| self.is_default() && self.eye.is_none()) {
+            return Ok(match view {
+                ours::View::LookAt { eye, target, up, fov_y } => View::LookAt { eye, target, up, fov_y },
+                ours::View::Orbit { yaw, pitch, fov_y } => View::Orbit { yaw, pitch, fov_y },
+            });
+        }
         if let Some(camera) = self.mounted(asset) {
             return match (&self.follow, self.eye) {
                 (None, None) => Ok(View::Mounted(camera)),

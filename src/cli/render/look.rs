@@ -72,9 +72,14 @@ impl LookArgs {
         self.background.is_some()
     }
 
-    /// What the options say, for an asset; `warn` is told what has no effect on it.
-    pub fn look(&self, asset: &Asset, warn: impl Fn(&str)) -> Result<Look, Failure> {
-        let file = self.look.as_ref().map(|p| read(p)).transpose()?.unwrap_or_default();
+    /// What the options or else the scene say, for an asset; `warn` is told what has no effect on it.
+    pub fn look(
+        &self,
+        asset: &Asset,
+        scene: Option<&LookFile>,
+        warn: impl Fn(&str),
+    ) -> Result<Look, Failure> {
+        let file = self.look.as_ref().map(|p| read(p)).transpose()?.or(scene.cloned()).unwrap_or_default();
         for patch in &file.materials {
             if !asset.materials.iter().any(|m| patch.matches(&m.name)) {
                 let names: Vec<&str> = asset.materials.iter().map(|m| m.name.as_str()).collect();

@@ -16,9 +16,10 @@ use super::{Failure, print, say, say::Say};
 use channels::Beside;
 use film::{Job, Written};
 use sinew::asset::Asset;
-use sinew::frames::{Look, Shot, ShotDesc};
+use sinew::frames::{Look, Props, Shot, ShotDesc};
 use sinew::io::Import;
 use sinew::io::picture::{Format, Target};
+use sinew::io::scene::{Setting, ours::SceneFile};
 use sinew::render::Settings;
 use sinew::time::Range;
 use stats::Totals;
@@ -49,7 +50,7 @@ seen over the whole clip, unless --camera names one of the asset's. An existing 
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// glTF files (.gltf, .glb) or rigs (.json).
+    /// glTF files (.gltf, .glb), rigs or scenes (.json).
     #[arg(required = true, value_name = "INPUT")]
     inputs: Vec<PathBuf>,
     /// Show the clips and cameras of the input and stop.
@@ -90,6 +91,18 @@ struct Task<'a> {
     target: &'a Target,
 }
 
+/// The scene of ours that an input is.
+fn scene(import: &Import) -> Option<&SceneFile> {
+    match &import.setting {
+        Some(Setting::Ours(scene)) => Some(scene),
+        _ => None,
+    }
+}
+
+fn props(scene: &SceneFile) -> Props {
+    Props { shapes: scene.shapes.clone(), materials: scene.materials.clone() }
+}
+
 /// Which pictures an output consists of.
 struct Plan {
     frames: Vec<Frame>,
@@ -101,20 +114,21 @@ fn plan(args: &Args, task: &Task) -> Result<Plan, Failure> {
     let range = task.clip.map_or(Range::default(), |c| clips[c].playback());
     let one_picture = args.sheet.is_one_picture();
     let alone = !task.target.takes_a_clip() && !one_picture;
-    let frames = args.time.frames(task.input, range, alone, args.camera.turntable)?;
+    let at = scene(task.import).and_then(|s| s.at);
+    let frames = args.time.frames(task.input, range, alone.then_some(at), args.camera.turntable)?;
     let single = !one_picture && !args.sheet.pixels.is_on() && !task.target.is_film(frames.len());
     args.channels.check(task.target, single)?;
     if !one_picture {
         task.target.check_frames(frames.len()).map_err(|e| Failure::Usage(e.to_string()))?;
     }
-    let settings = args.output.settings()?;
+    let settings = args.output.settings(scene(task.import).and_then(|s| s.size))?;
     let whole = [settings.width, settings.height];
     Ok(Plan { frames, size: args.camera.crop(whole)?.map_or(whole, |c| [c.width, c.height]) })
 }
 
 /// Draw the frames of a plan and write them.
 fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -> Result<Written, Failure> {
-    let asset = &task.import.asset;
+    let (asset, scene) = (&task.import.asset, scene(task.import));
     let character = &asset.character;
     let overlays = args.overlay.overlays(asset, args.time.fps)?;
     let bare = character.instances().iter().all(|i| character.mesh(i).triangles.is_empty());
@@ -137,14 +151,15 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
     let threads = args.output.threads();
     let one_picture = args.sheet.is_one_picture();
     let alone = plan.frames.len() == 1 && !one_picture;
-    let settings = args.sheet.settings(args.output.settings()?)?;
+    let settings = args.sheet.settings(args.output.settings(scene.and_then(|s| s.size))?)?;
     let settings = Settings { threads: if alone { threads } else { 1 }, ..settings };
     let desc = ShotDesc {
         clip: task.clip,
         wrap: args.time.wrap(args.camera.turntable),
-        view: args.sheet.view(args.camera.view(asset)?, args.camera.is_default()),
+        view: args.sheet.view(args.camera.view(asset, scene)?, args.camera.is_default()),
         framing: args.camera.framing(asset)?,
-        look: args.look.look(asset, |m| say.warn(m))?,
+        look: args.look.look(asset, scene.map(|s| &s.look), |m| say.warn(m))?,
+        props: scene.map(props).unwrap_or_default(),
         overlays,
         crop: args.camera.crop([settings.width, settings.height])?,
         settings,
