@@ -1,5 +1,7 @@
 //! Rays, hits, and the two numbers they are made of.
 
+use super::lanes::Lanes;
+use super::triangle::{Pack, Shear};
 use std::ops::{Add, Div, Mul, Sub};
 
 /// A ray `origin + t·direction` with `t` in `t_min…t_max`, both included; the direction has any length.
@@ -45,10 +47,22 @@ impl<R: Real> Hit<R> {
 }
 
 mod sealed {
-    pub trait Sealed {}
-    impl Sealed for f32 {}
-    impl Sealed for f64 {}
+    use super::super::{
+        lanes::Lanes,
+        triangle::{Pack, Shear},
+    };
+
+    /// What differs between the two.
+    pub trait Sealed: Sized {
+        /// Rounded to nearest.
+        fn from_f64(x: f64) -> Self;
+        /// `a·b − c·d`, with the sign of the exact value and a relative error of at most 2⁻⁵².
+        fn minor(a: Self, b: Self, c: Self, d: Self) -> f64;
+        /// Which triangles of a pack may be hit.
+        fn candidates<S: Lanes>(pack: &Pack, ray: &Shear<Self>) -> u32;
+    }
 }
+use sealed::Sealed;
 
 /// `f32`, or `f64` for reference.
 pub trait Real:
@@ -63,19 +77,18 @@ pub trait Real:
     + Into<f64>
     + Send
     + Sync
-    + sealed::Sealed
+    + Sealed
     + 'static
 {
     /// Beyond every `t`.
     const INFINITY: Self;
-    /// Rounded to nearest.
-    fn from_f64(x: f64) -> Self;
-    /// `a·b − c·d`, with the sign of the exact value and a relative error of at most 2⁻⁵².
-    fn minor(a: Self, b: Self, c: Self, d: Self) -> f64;
 }
 
 impl Real for f32 {
     const INFINITY: Self = f32::INFINITY;
+}
+
+impl Sealed for f32 {
     #[inline(always)]
     fn from_f64(x: f64) -> Self {
         x as f32
@@ -85,10 +98,17 @@ impl Real for f32 {
         // Products of two f32 are exact in f64.
         a as f64 * b as f64 - c as f64 * d as f64
     }
+    #[inline(always)]
+    fn candidates<S: Lanes>(pack: &Pack, ray: &Shear<f32>) -> u32 {
+        S::candidates(pack, ray)
+    }
 }
 
 impl Real for f64 {
     const INFINITY: Self = f64::INFINITY;
+}
+
+impl Sealed for f64 {
     #[inline(always)]
     fn from_f64(x: f64) -> Self {
         x
@@ -98,6 +118,10 @@ impl Real for f64 {
         // Kahan's difference of products; right to 1.5 ulp (Jeannerod, Louvet, Muller 2013).
         let cd = c * d;
         a.mul_add(b, -cd) + (-c).mul_add(d, cd)
+    }
+    #[inline(always)]
+    fn candidates<S: Lanes>(pack: &Pack, ray: &Shear<f64>) -> u32 {
+        pack.candidates(ray)
     }
 }
 
@@ -109,7 +133,7 @@ pub(super) const REACH: f32 = (1u64 << 40) as f32;
 
 /// A ray as boxes see it: box planes `b` are crossed at `t = b·slope − near` or `b·slope − far`, rounded outwards.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Slab {
+pub struct Slab {
     pub slope: [f32; 3],
     pub near: [f32; 3],
     pub far: [f32; 3],

@@ -10,7 +10,7 @@ use glam::Vec3;
 
 /// A ray as triangles see it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Shear<R> {
+pub struct Shear<R> {
     pub origin: [R; 3],
     /// Which axes are x, y and z of the sheared frame; z is the longest of the direction.
     pub axes: [usize; 3],
@@ -73,7 +73,7 @@ impl<R: Real> Shear<R> {
 /// Four triangles side by side, what a leaf holds.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
-pub(super) struct Pack {
+pub struct Pack {
     /// Corner, axis, triangle.
     pub corners: [[[f32; 4]; 3]; 3],
     /// Which triangles; `EMPTY` where there is none, with corners of its neighbour.
