@@ -27,8 +27,9 @@ pub trait Lanes: Copy {
     type Ray;
     /// Make it ready.
     fn ray(slab: &Slab) -> Self::Ray;
-    /// Put the children that a ray enters before `t_max` on the stack, the farther the deeper.
-    fn push(node: &Node, ray: &Self::Ray, t_max: f32, stack: &mut Stack);
+    /// The child that a ray enters first, if it does so before `t_max`; the others that it enters go on the stack, the farther the
+    /// deeper.
+    fn enter(node: &Node, ray: &Self::Ray, t_max: f32, stack: &mut Stack) -> Option<u32>;
     /// Which of four triangles may be hit, a bit each: all but those that the signs of rounded edge functions rule out.
     fn candidates(pack: &Pack, ray: &Shear<f32>) -> u32;
 }
@@ -78,7 +79,7 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn push(node: &Node, ray: &Slab, t_max: f32, stack: &mut Stack) {
+    fn enter(node: &Node, ray: &Slab, t_max: f32, stack: &mut Stack) -> Option<u32> {
         let (mut bits, enter) = node.entered(ray, t_max);
         let first = stack.top;
         while bits != 0 {
@@ -93,6 +94,11 @@ impl Lanes for Portable {
             (stack.t[i], stack.at[i]) = (t, at);
             stack.top += 1;
         }
+        if stack.top == first {
+            return None;
+        }
+        stack.top -= 1;
+        Some(stack.at[stack.top])
     }
 
     #[inline(always)]
@@ -125,18 +131,18 @@ mod avx2 {
         octant: usize,
     }
 
-    /// For each set of lanes, where its members are, first to last.
+    /// The members of each set of lanes, last to first.
     static MEMBERS: [[u8; 8]; 256] = {
         let mut all = [[0; 8]; 256];
         let mut set = 0;
         while set < 256 {
-            let (mut lane, mut n) = (0, 0);
-            while lane < 8 {
+            let (mut lane, mut n) = (8, 0);
+            while lane > 0 {
+                lane -= 1;
                 if set >> lane & 1 == 1 {
                     all[set][n] = lane as u8;
                     n += 1;
                 }
-                lane += 1;
             }
             set += 1;
         }
@@ -207,10 +213,7 @@ mod avx2 {
         }
 
         #[inline(always)]
-        fn push(node: &Node, ray: &Ray, t_max: f32, stack: &mut Stack) {
-            let top = stack.top;
-            let t = &mut stack.t[top..top + 8];
-            let at = &mut stack.at[top..top + 8];
+        fn enter(node: &Node, ray: &Ray, t_max: f32, stack: &mut Stack) -> Option<u32> {
             unsafe {
                 let (near, far) = (ray.near, ray.far);
                 let [x0, y0, z0] = crossed(node, ray.enter, ray.slope, near);
@@ -219,17 +222,31 @@ mod avx2 {
                 let leave = _mm256_min_ps(_mm256_min_ps(x1, y1), _mm256_min_ps(z1, _mm256_set1_ps(t_max)));
                 let met = _mm256_cmp_ps::<_CMP_LE_OQ>(enter, leave);
 
-                // Order by octant, then leave gaps out.
+                // In the order of the octant, the first goes on at once.
                 let shifts = _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28);
-                let order = _mm256_srlv_epi32(_mm256_set1_epi32(node.order[ray.octant] as i32), shifts);
-                let set = _mm256_movemask_ps(_mm256_permutevar8x32_ps(met, order)) as usize;
-                let members = _mm_loadl_epi64(MEMBERS[set & 255].as_ptr().cast());
+                let packed = node.order[ray.octant];
+                let order = _mm256_srlv_epi32(_mm256_set1_epi32(packed as i32), shifts);
+                let set = _mm256_movemask_ps(_mm256_permutevar8x32_ps(met, order)) as u32;
+                if set == 0 {
+                    return None;
+                }
+                let first = node.children[(packed >> (4 * set.trailing_zeros()) & 7) as usize];
+                let set = set & (set - 1);
+                if set == 0 {
+                    return Some(first);
+                }
+
+                // The others without gaps.
+                let top = stack.top;
+                let (t, at) = (&mut stack.t[top..top + 8], &mut stack.at[top..top + 8]);
+                let members = _mm_loadl_epi64(MEMBERS[set as usize & 255].as_ptr().cast());
                 let members = _mm256_permutevar8x32_epi32(order, _mm256_cvtepu8_epi32(members));
                 let children = _mm256_load_si256(node.children.as_ptr().cast());
                 _mm256_storeu_ps(t.as_mut_ptr(), _mm256_permutevar8x32_ps(enter, members));
                 let children = _mm256_permutevar8x32_epi32(children, members);
                 _mm256_storeu_si256(at.as_mut_ptr().cast(), children);
                 stack.top = top + set.count_ones() as usize;
+                Some(first)
             }
         }
 

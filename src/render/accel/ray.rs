@@ -157,7 +157,8 @@ impl Slab {
     #[inline(always)]
     pub fn new<R: Real>(ray: &Ray<R>, lo: [f32; 3], hi: [f32; 3], slack: f32) -> Option<Self> {
         let round = |x: R| Into::<f64>::into(x) as f32;
-        let (o, d) = (ray.origin.map(round), ray.direction.map(round));
+        let three = |v: [R; 3]| [round(v[0]), round(v[1]), round(v[2])];
+        let (o, d) = (three(ray.origin), three(ray.direction));
         let longest = d[0].abs().max(d[1].abs()).max(d[2].abs());
         let fits = |x: f32| x.abs() <= REACH;
         let finite = d.iter().all(|x| x.is_finite()) && o.iter().all(|&x| fits(x));

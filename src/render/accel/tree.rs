@@ -16,7 +16,7 @@ pub struct Node {
     pub planes: [F8; 6],
     /// Nodes, or leaves.
     pub children: [u32; 8],
-    /// For each octant of directions, the lanes from the farthest to the nearest, four bits each.
+    /// For each octant of directions, the lanes from the nearest to the farthest, four bits each.
     pub order: [u32; 8],
 }
 
@@ -42,7 +42,7 @@ impl Node {
             let along = |k: usize| (self.planes[k] + self.planes[k + 3]) * sign(k);
             let key = (along(0) + along(1) + along(2)).0;
             let mut lanes = [0, 1, 2, 3, 4, 5, 6, 7];
-            lanes.sort_by(|&a, &b| key[b as usize].total_cmp(&key[a as usize]));
+            lanes.sort_by(|&a, &b| key[a as usize].total_cmp(&key[b as usize]));
             self.order[octant] = lanes.iter().rev().fold(0, |bits, lane| bits << 4 | lane);
         }
     }
@@ -109,7 +109,10 @@ pub(super) fn walk<S: Lanes>(nodes: &[Node], slab: &Slab, visitor: &mut impl Vis
     let mut at = 0;
     loop {
         if at & LEAF == 0 {
-            S::push(&nodes[at as usize], &ray, t_max, &mut stack);
+            if let Some(child) = S::enter(&nodes[at as usize], &ray, t_max, &mut stack) {
+                at = child;
+                continue;
+            }
         } else {
             t_max = visitor.leaf::<S>(at & !LEAF, t_max);
         }

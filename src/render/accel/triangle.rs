@@ -26,7 +26,8 @@ impl<R: Real> Shear<R> {
     #[inline(always)]
     pub fn new(ray: &Ray<R>) -> Self {
         let d = ray.direction;
-        let size = d.map(|x| Into::<f64>::into(x).abs());
+        let along = |k: usize| Into::<f64>::into(d[k]).abs();
+        let size = [along(0), along(1), along(2)];
         let z = if size[0] > size[1] && size[0] > size[2] { 0 } else { 1 + (size[1] <= size[2]) as usize };
         let (x, y) = ((z + 1) % 3, (z + 2) % 3);
         // A reflected frame would turn the winding round.
@@ -44,14 +45,17 @@ impl<R: Real> Shear<R> {
     /// A corner in the sheared frame.
     #[inline(always)]
     fn apply(&self, p: [f32; 3]) -> [R; 3] {
-        let d = self.axes.map(|k| R::from(p[k]) - self.origin[k]);
-        [d[0] - self.slope[0] * d[2], d[1] - self.slope[1] * d[2], d[2]]
+        let [x, y, z] = self.axes;
+        let depth = R::from(p[z]) - self.origin[z];
+        let x = (R::from(p[x]) - self.origin[x]) - self.slope[0] * depth;
+        let y = (R::from(p[y]) - self.origin[y]) - self.slope[1] * depth;
+        [x, y, depth]
     }
 
     /// The hit with one triangle, edges and corners included; none in its own plane.
     #[inline(always)]
     pub fn hit(&self, corners: [[f32; 3]; 3], object: u32, triangle: u32) -> Option<Hit<R>> {
-        let [a, b, c] = corners.map(|p| self.apply(p));
+        let (a, b, c) = (self.apply(corners[0]), self.apply(corners[1]), self.apply(corners[2]));
         let u = R::minor(c[0], b[1], c[1], b[0]);
         let v = R::minor(a[0], c[1], a[1], c[0]);
         let w = R::minor(b[0], a[1], b[1], a[0]);
@@ -107,7 +111,8 @@ impl Pack {
     /// The corners of one triangle.
     #[inline(always)]
     pub fn corners_of(&self, lane: usize) -> [[f32; 3]; 3] {
-        self.corners.map(|c| c.map(|axis| axis[lane]))
+        let at = |c: usize| [self.corners[c][0][lane], self.corners[c][1][lane], self.corners[c][2][lane]];
+        [at(0), at(1), at(2)]
     }
 
     /// Its box.
@@ -133,7 +138,8 @@ impl Pack {
     pub fn candidates<R: Real>(&self, ray: &Shear<R>) -> u32 {
         let mut bits = 0;
         for lane in 0..4 {
-            let [a, b, c] = self.corners_of(lane).map(|p| ray.apply(p));
+            let corners = self.corners_of(lane);
+            let (a, b, c) = (ray.apply(corners[0]), ray.apply(corners[1]), ray.apply(corners[2]));
             let signs = |p: R, q: R| ((p > q) as u32) | ((p < q) as u32) << 1;
             let all = signs(c[0] * b[1], c[1] * b[0])
                 | signs(a[0] * c[1], a[1] * c[0])
