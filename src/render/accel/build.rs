@@ -25,7 +25,7 @@ impl Item {
 
 /// A growing box.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Span {
+pub struct Span {
     pub lo: Vec3,
     pub hi: Vec3,
 }

@@ -185,7 +185,7 @@ impl Accel {
     /// Search among all hits of a ray as far as `t_max`.
     #[inline(always)]
     fn search<S: Lanes, R: Real>(&self, ray: &Ray<R>, object: u32, t_max: f32, search: &mut impl Search<R>) {
-        let Some(mut slab) = Slab::new(ray, self.span.lo.into(), self.span.hi.into(), 1.0) else { return };
+        let Some(mut slab) = Slab::new(ray, &self.span, 1.0) else { return };
         slab.t_max = slab.t_max.min(t_max);
         let mut packs = Packs { packs: &self.packs, shear: Shear::new(ray), object, search };
         match self.kind {

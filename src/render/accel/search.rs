@@ -3,7 +3,7 @@
 use super::lanes::Lanes;
 use super::ray::{Hit, Real, above};
 use super::tree::Visitor;
-use super::triangle::{Pack, Shear};
+use super::triangle::{Meetings, Pack, Shear};
 
 /// A question that hits answer.
 pub(super) trait Search<R> {
@@ -77,16 +77,15 @@ impl<R: Real, Q: Search<R>> Visitor for Packs<'_, R, Q> {
     #[inline(always)]
     fn leaf<S: Lanes>(&mut self, leaf: u32, t_max: f32) -> f32 {
         let pack = &self.packs[leaf as usize];
-        let mut bits = R::candidates::<S>(pack, &self.shear);
+        let mut all = Meetings::new();
+        let mut bits = R::meet::<S>(pack, &self.shear, &mut all);
         if bits == 0 {
             return t_max;
         }
         while bits != 0 {
             let lane = bits.trailing_zeros() as usize & 3;
             bits &= bits - 1;
-            if let Some(hit) = self.shear.hit(pack.corners_of(lane), self.object, pack.ids[lane]) {
-                self.search.found(hit);
-            }
+            self.search.found(all.hit(lane, self.object, pack.ids[lane]));
         }
         self.search.limit(t_max)
     }

@@ -84,8 +84,9 @@ impl Node {
     /// Which children a ray enters before `t_max`, and where.
     #[inline(always)]
     pub fn entered(&self, ray: &Slab, t_max: f32) -> (u32, F8) {
-        let near = |k: usize| self.planes[ray.enter[k]] * ray.slope[k] + -ray.near[k];
-        let far = |k: usize| self.planes[(ray.enter[k] + 3) % 6] * ray.slope[k] + -ray.far[k];
+        let row = |k: usize| k + 3 * (ray.octant >> k & 1);
+        let near = |k: usize| self.planes[row(k)] * ray.slope[k] + -ray.near[k];
+        let far = |k: usize| self.planes[(row(k) + 3) % 6] * ray.slope[k] + -ray.far[k];
         let enter = near(0).max(near(1)).max(near(2).max(F8::splat(ray.t_min)));
         let leave = far(0).min(far(1)).min(far(2).min(F8::splat(t_max)));
         (leave.ge(enter).bitmask(), enter)
@@ -105,7 +106,7 @@ pub(super) fn walk<S: Lanes>(nodes: &[Node], slab: &Slab, visitor: &mut impl Vis
         return;
     }
     let (ray, mut t_max) = (S::ray(slab), slab.t_max);
-    let mut stack = Stack { t: [0.0; _], at: [0; _], top: 0 };
+    let mut stack = Stack::new();
     let mut at = 0;
     loop {
         if at & LEAF == 0 {
@@ -116,16 +117,13 @@ pub(super) fn walk<S: Lanes>(nodes: &[Node], slab: &Slab, visitor: &mut impl Vis
         } else {
             t_max = visitor.leaf::<S>(at & !LEAF, t_max);
         }
-        loop {
-            if stack.top == 0 {
-                return;
+        at = loop {
+            match stack.pop() {
+                None => return,
+                Some((t, at)) if t <= t_max => break at,
+                _ => {}
             }
-            stack.top -= 1;
-            if stack.t[stack.top] <= t_max {
-                break;
-            }
-        }
-        at = stack.at[stack.top];
+        };
     }
 }
 

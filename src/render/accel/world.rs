@@ -196,9 +196,7 @@ impl<R: Real, Q: Search<R>> Work for Query<'_, R, Q> {
         if let [Object { surface_from_world: None, placed, .. }] = &world.objects[..] {
             let mut own = Own { object: &world.objects[0], search: &mut self.search };
             world.parts[placed.surface].search::<S, R>(self.ray, 0, f32::INFINITY, &mut own);
-        } else if let Some(slab) =
-            Slab::new(self.ray, world.span.lo.into(), world.span.hi.into(), world.slack)
-        {
+        } else if let Some(slab) = Slab::new(self.ray, &world.span, world.slack) {
             tree::walk::<S>(&world.nodes, &slab, &mut self);
         }
         self.search
