@@ -1,6 +1,7 @@
 //! Top-down build by binned surface-area heuristic (Wald 2007), eight children at once.
 
-use super::tree::{DEPTH, LEAF, Node};
+use super::lanes::DEPTH;
+use super::tree::{LEAF, Node};
 use glam::Vec3;
 
 /// Triangles in a leaf at most.
@@ -24,7 +25,7 @@ impl Item {
 
 /// A growing box.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Span {
+pub struct Span {
     pub lo: Vec3,
     pub hi: Vec3,
 }
@@ -89,6 +90,7 @@ pub(super) fn grow(items: &mut [Item], leaf: usize, threads: usize) -> Grown {
     let ranges = eight(items, all, leaf, DEPTH);
     let mut node = Node::EMPTY;
     ranges.iter().enumerate().for_each(|(i, r)| node.set(i, (r.span.lo, r.span.hi)));
+    node.sort();
     grown.nodes.push(node);
 
     // Each child is grown by itself.
@@ -134,6 +136,7 @@ fn child(items: &mut [Item], range: Range, leaf: usize, depth: usize, grown: &mu
         grown.nodes[at].set(i, (r.span.lo, r.span.hi));
         grown.nodes[at].children[i] = child(items, r, leaf, depth - 1, grown);
     }
+    grown.nodes[at].sort();
     at as u32
 }
 

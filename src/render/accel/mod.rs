@@ -15,7 +15,9 @@
 //! ```
 
 mod build;
+mod lanes;
 mod ray;
+mod search;
 mod tree;
 mod triangle;
 mod world;
@@ -23,11 +25,13 @@ mod world;
 pub use ray::{Hit, Ray, Real};
 pub use world::{Motion, Placed, Surface, Updated, World};
 
-use crate::math::simd::{Isa, Kernel};
+use crate::math::simd::Isa;
 use build::{Item, Span};
 use glam::Vec3;
-use ray::{Slab, above};
-use tree::Node;
+use lanes::{Lanes, Machine, Work};
+use ray::Slab;
+use search::{Any, Nearest, Packs, Search};
+use tree::{Node, Visitor};
 use triangle::{EMPTY, Pack, Shear, standing};
 
 /// How triangles are found. The answers are the same.
@@ -49,7 +53,7 @@ const DECAY: f64 = 1.3;
 #[derive(Clone, Debug)]
 pub struct Accel {
     kind: Kind,
-    isa: Isa,
+    machine: Machine,
     triangles: Vec<[u32; 3]>,
     span: Span,
     packs: Vec<Pack>,
@@ -69,7 +73,7 @@ impl Accel {
         assert!(triangles.len() < 1 << 30, "{} triangles: fewer than 2^30 are possible", triangles.len());
         let mut accel = Self {
             kind,
-            isa: Isa::Best,
+            machine: Machine::new(Isa::Best),
             triangles: triangles.to_vec(),
             span: Span::EMPTY,
             packs: Vec::new(),
@@ -83,7 +87,7 @@ impl Accel {
 
     /// The same with another build of the kernels; for tests and measurements.
     pub fn with_isa(self, isa: Isa) -> Self {
-        Self { isa, ..self }
+        Self { machine: Machine::new(isa), ..self }
     }
 
     /// The triangles, as they were given.
@@ -171,96 +175,46 @@ impl Accel {
         (self.span.lo, self.span.hi) = root.bounds();
     }
 
-    /// The first hit that `accept` takes.
+    /// The first hit that `accept` takes, as [`World::nearest`]; the object is 0.
+    #[inline]
     pub fn nearest<R: Real>(&self, ray: &Ray<R>, accept: impl Fn(&Hit<R>) -> bool) -> Option<Hit<R>> {
-        let mut best = None;
-        crate::math::simd::run(
-            self.isa,
-            Nearest { accel: self, ray, object: 0, accept: &accept, best: &mut best },
-        );
-        best
+        self.machine.run(Alone { accel: self, ray, search: Nearest::new(accept) }).best
     }
 
     /// Whether `accept` takes any hit.
+    #[inline]
     pub fn blocked<R: Real>(&self, ray: &Ray<R>, accept: impl Fn(&Hit<R>) -> bool) -> bool {
-        crate::math::simd::run(self.isa, Blocked { accel: self, ray, object: 0, accept: &accept })
+        self.machine.run(Alone { accel: self, ray, search: Any::new(accept) }).found
     }
 
-    /// Show the packs that a ray may hit; `leaf` gives the last `t` that is still of interest.
+    /// Search among all hits of a ray as far as `t_max`.
     #[inline(always)]
-    fn visit<R: Real>(&self, ray: &Ray<R>, mut leaf: impl FnMut(&Pack, f32) -> f32) {
-        let Some(slab) = Slab::new(ray, self.span.lo.into(), self.span.hi.into(), 1.0) else { return };
+    fn search<S: Lanes, R: Real>(&self, ray: &Ray<R>, object: u32, t_max: f32, search: &mut impl Search<R>) {
+        let Some(mut slab) = Slab::new(ray, &self.span, 1.0) else { return };
+        slab.t_max = slab.t_max.min(t_max);
+        let mut packs = Packs { packs: &self.packs, shear: Shear::new(ray), object, search };
         match self.kind {
-            Kind::Tree => {
-                tree::walk(&self.nodes, &slab, slab.t_max, |at, t| leaf(&self.packs[at as usize], t))
-            }
+            Kind::Tree => tree::walk::<S>(&self.nodes, &slab, &mut packs),
             Kind::Brute => {
-                let mut t = slab.t_max;
-                for pack in &self.packs {
-                    t = leaf(pack, t);
-                }
+                (0..self.packs.len()).fold(slab.t_max, |t, at| packs.leaf::<S>(at as u32, t));
             }
         }
     }
 }
 
-/// Look for the first hit of one surface, and keep it if it comes before `best`.
-pub(super) struct Nearest<'a, R, F> {
+/// A search in one surface.
+struct Alone<'a, R, Q> {
     accel: &'a Accel,
     ray: &'a Ray<R>,
-    object: u32,
-    accept: F,
-    best: &'a mut Option<Hit<R>>,
+    search: Q,
 }
 
-impl<R: Real, F: Fn(&Hit<R>) -> bool> Kernel for Nearest<'_, R, F> {
-    type Output = ();
+impl<R: Real, Q: Search<R>> Work for Alone<'_, R, Q> {
+    type Output = Q;
     #[inline(always)]
-    fn run(self) {
-        let shear = Shear::new(self.ray);
-        self.accel.visit(self.ray, |pack, mut t_max| {
-            let mut bits = pack.candidates(&shear);
-            while bits != 0 {
-                let lane = bits.trailing_zeros() as usize;
-                bits &= bits - 1;
-                if let Some(hit) = shear.hit(pack.corners_of(lane), self.object, pack.ids[lane])
-                    && self.best.is_none_or(|b| hit.before(&b))
-                    && (self.accept)(&hit)
-                {
-                    *self.best = Some(hit);
-                    t_max = above(hit.t);
-                }
-            }
-            t_max
-        });
-    }
-}
-
-/// Look for any hit of one surface.
-pub(super) struct Blocked<'a, R, F> {
-    accel: &'a Accel,
-    ray: &'a Ray<R>,
-    object: u32,
-    accept: F,
-}
-
-impl<R: Real, F: Fn(&Hit<R>) -> bool> Kernel for Blocked<'_, R, F> {
-    type Output = bool;
-    #[inline(always)]
-    fn run(self) -> bool {
-        let shear = Shear::new(self.ray);
-        let mut found = false;
-        self.accel.visit(self.ray, |pack, t_max| {
-            let mut bits = pack.candidates(&shear);
-            while bits != 0 && !found {
-                let lane = bits.trailing_zeros() as usize;
-                bits &= bits - 1;
-                let hit = shear.hit(pack.corners_of(lane), self.object, pack.ids[lane]);
-                found = hit.is_some_and(|h| (self.accept)(&h));
-            }
-            if found { f32::NEG_INFINITY } else { t_max }
-        });
-        found
+    fn run<S: Lanes>(mut self) -> Q {
+        self.accel.search::<S, R>(self.ray, 0, f32::INFINITY, &mut self.search);
+        self.search
     }
 }
 

@@ -1,5 +1,9 @@
 //! Rays, hits, and the two numbers they are made of.
 
+use super::build::Span;
+use super::lanes::Lanes;
+use super::triangle::{Meetings, Pack, Shear};
+use glam::Vec3A;
 use std::ops::{Add, Div, Mul, Sub};
 
 /// A ray `origin + t·direction` with `t` in `t_min…t_max`, both included; the direction has any length.
@@ -45,10 +49,22 @@ impl<R: Real> Hit<R> {
 }
 
 mod sealed {
-    pub trait Sealed {}
-    impl Sealed for f32 {}
-    impl Sealed for f64 {}
+    use super::super::{
+        lanes::Lanes,
+        triangle::{Meetings, Pack, Shear},
+    };
+
+    /// What differs between the two.
+    pub trait Sealed: Sized {
+        /// Rounded to nearest.
+        fn from_f64(x: f64) -> Self;
+        /// `a·b − c·d`, with the sign of the exact value and a relative error of at most 2⁻⁵².
+        fn minor(a: Self, b: Self, c: Self, d: Self) -> f64;
+        /// Which triangles of a pack are hit, a bit each.
+        fn meet<S: Lanes>(pack: &Pack, ray: &Shear<Self>, out: &mut Meetings<Self>) -> u32;
+    }
 }
+use sealed::Sealed;
 
 /// `f32`, or `f64` for reference.
 pub trait Real:
@@ -63,19 +79,18 @@ pub trait Real:
     + Into<f64>
     + Send
     + Sync
-    + sealed::Sealed
+    + Sealed
     + 'static
 {
     /// Beyond every `t`.
     const INFINITY: Self;
-    /// Rounded to nearest.
-    fn from_f64(x: f64) -> Self;
-    /// `a·b − c·d`, with the sign of the exact value and a relative error of at most 2⁻⁵².
-    fn minor(a: Self, b: Self, c: Self, d: Self) -> f64;
 }
 
 impl Real for f32 {
     const INFINITY: Self = f32::INFINITY;
+}
+
+impl Sealed for f32 {
     #[inline(always)]
     fn from_f64(x: f64) -> Self {
         x as f32
@@ -85,10 +100,17 @@ impl Real for f32 {
         // Products of two f32 are exact in f64.
         a as f64 * b as f64 - c as f64 * d as f64
     }
+    #[inline(always)]
+    fn meet<S: Lanes>(pack: &Pack, ray: &Shear<f32>, out: &mut Meetings<f32>) -> u32 {
+        S::meet(pack, ray, out)
+    }
 }
 
 impl Real for f64 {
     const INFINITY: Self = f64::INFINITY;
+}
+
+impl Sealed for f64 {
     #[inline(always)]
     fn from_f64(x: f64) -> Self {
         x
@@ -98,6 +120,10 @@ impl Real for f64 {
         // Kahan's difference of products; right to 1.5 ulp (Jeannerod, Louvet, Muller 2013).
         let cd = c * d;
         a.mul_add(b, -cd) + (-c).mul_add(d, cd)
+    }
+    #[inline(always)]
+    fn meet<S: Lanes>(pack: &Pack, ray: &Shear<f64>, out: &mut Meetings<f64>) -> u32 {
+        pack.meet(ray, out)
     }
 }
 
@@ -109,71 +135,53 @@ pub(super) const REACH: f32 = (1u64 << 40) as f32;
 
 /// A ray as boxes see it: box planes `b` are crossed at `t = b·slope − near` or `b·slope − far`, rounded outwards.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Slab {
-    pub slope: [f32; 3],
-    pub near: [f32; 3],
-    pub far: [f32; 3],
-    /// Row of a node's planes where the ray enters, an axis: 0…2 or 3…5.
-    pub enter: [usize; 3],
-    /// Signs of the direction, one bit an axis.
+pub struct Slab {
+    pub slope: Vec3A,
+    pub near: Vec3A,
+    pub far: Vec3A,
+    /// Signs of the direction, one bit an axis; −0 counts as negative, which is as right.
     pub octant: usize,
     pub t_min: f32,
     pub t_max: f32,
 }
 
 impl Slab {
-    /// Widened so that no box is missed whose triangle is hit, by all that rounding can do before a box `lo…hi` around
-    /// everything has been crossed (Ize 2013; Woop, Benthin, Wald 2013 §3.3, with one bound for all axes).
+    /// Widened so that no box is missed whose triangle is hit, by all that rounding can do before a box around everything has
+    /// been crossed (Ize 2013; Woop, Benthin, Wald 2013 §3.3, with one bound for all axes).
     ///
     /// With `u = 2⁻²⁴` and `m` the farthest that a corner lies from the origin: the sheared corners are off by `6um`, `t` by
     /// `4um`, the crossings by `3um + 3u|origin|`; twice that is taken. A slope is at most 2³⁰ times the smallest: over `m` the
-    /// ray then moves by less than the slack, and 1/0 never occurs.
+    /// ray then moves by less than the slack, and neither 1/0 nor 0·∞ occurs.
     ///
     /// `None` for rays that hit nothing.
     #[inline(always)]
-    pub fn new<R: Real>(ray: &Ray<R>, lo: [f32; 3], hi: [f32; 3], slack: f32) -> Option<Self> {
+    pub fn new<R: Real>(ray: &Ray<R>, span: &Span, slack: f32) -> Option<Self> {
         let round = |x: R| Into::<f64>::into(x) as f32;
-        let (o, d) = (ray.origin.map(round), ray.direction.map(round));
-        let longest = d[0].abs().max(d[1].abs()).max(d[2].abs());
-        let fits = |x: f32| x.abs() <= REACH;
-        let finite = d.iter().all(|x| x.is_finite()) && o.iter().all(|&x| fits(x));
+        let three = |v: &[R; 3]| Vec3A::new(round(v[0]), round(v[1]), round(v[2]));
+        let (o, d) = (three(&ray.origin), three(&ray.direction));
+        let (size, away) = (d.abs(), o.abs());
+        let longest = size.max_element();
+        let near = size.max(away).cmple(Vec3A::splat(REACH)).all() && !(d + o).is_nan();
         let (t_min, t_max) = (round(ray.t_min), round(ray.t_max));
-        if !(finite && (1.0 / REACH..=REACH).contains(&longest) && t_min.is_finite() && t_max >= t_min) {
+        if !(near && longest >= 1.0 / REACH && t_min.is_finite() && t_max >= t_min) {
             return None;
         }
-        let reach = (0..3).map(|k| (o[k] - lo[k]).abs().max((hi[k] - o[k]).abs())).fold(0.0, f32::max);
-        let least = longest * (0.5f32).powi(30);
-        let mut s = Self {
-            slope: [0.0; 3],
-            near: [0.0; 3],
-            far: [0.0; 3],
-            enter: [0, 1, 2],
-            octant: 0,
-            t_min: below(t_min),
+        let reach = (o - Vec3A::from(span.lo)).abs().max((Vec3A::from(span.hi) - o).abs()).max_element();
+        let slope = Vec3A::ONE / size.max(Vec3A::splat(longest * (0.5f32).powi(30)));
+        let off = (Vec3A::splat(SLACK * reach) + away * (0.5 * SLACK)) * slope * slack;
+        let slope = slope.copysign(d);
+        Some(Self {
+            slope,
+            near: o * slope + off,
+            far: o * slope - off,
+            octant: d.is_negative_bitmask() as usize,
+            t_min: t_min - t_min.abs() * f32::EPSILON,
             t_max: above(t_max),
-        };
-        for k in 0..3 {
-            // −0 counts as negative: both signs are right for a ray along the other axes.
-            let negative = d[k].is_sign_negative();
-            let slope = 1.0 / d[k].abs().max(least);
-            let off = slack * (SLACK * reach + 0.5 * SLACK * o[k].abs()) * slope;
-            s.slope[k] = if negative { -slope } else { slope };
-            s.near[k] = o[k] * s.slope[k] + off;
-            s.far[k] = o[k] * s.slope[k] - off;
-            s.enter[k] += 3 * negative as usize;
-            s.octant |= (negative as usize) << k;
-        }
-        Some(s)
+        })
     }
 }
 
-/// A little less, so that rounding of a `t` in f64 to f32 does not matter.
-#[inline(always)]
-fn below(t: f32) -> f32 {
-    t - t.abs() * f32::EPSILON
-}
-
-/// A little more.
+/// A little more, so that rounding of a `t` in f64 to f32 does not matter.
 #[inline(always)]
 pub(super) fn above<R: Real>(t: R) -> f32 {
     let t = Into::<f64>::into(t) as f32;

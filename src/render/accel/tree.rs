@@ -1,5 +1,6 @@
 //! A tree of boxes, eight to a node; what its leaves are is the caller's business.
 
+use super::lanes::{Lanes, Stack};
 use super::ray::Slab;
 use crate::math::simd::F8;
 use glam::Vec3;
@@ -7,26 +8,22 @@ use glam::Vec3;
 /// A child that is a leaf; the other bits say which.
 pub(super) const LEAF: u32 = 1 << 31;
 
-/// Nodes above one another at most; builders halve what is left before they run out.
-pub(super) const DEPTH: usize = 16;
-
-/// What a walk can have put aside: seven siblings a level.
-const STACK: usize = 7 * DEPTH + 1;
-
 /// Eight boxes, lane by lane; those that are empty (+∞…−∞) are missed by every ray.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub(super) struct Node {
+pub struct Node {
     /// Low x, y, z, then high x, y, z.
     pub planes: [F8; 6],
     /// Nodes, or leaves.
     pub children: [u32; 8],
+    /// For each octant of directions, the lanes from the nearest to the farthest, four bits each.
+    pub order: [u32; 8],
 }
 
 impl Node {
     pub const EMPTY: Self = {
         let (lo, hi) = (F8([f32::INFINITY; 8]), F8([f32::NEG_INFINITY; 8]));
-        Self { planes: [lo, lo, lo, hi, hi, hi], children: [LEAF; 8] }
+        Self { planes: [lo, lo, lo, hi, hi, hi], children: [LEAF; 8], order: [0x7654_3210; 8] }
     };
 
     /// Put a child's box into its lane.
@@ -35,6 +32,18 @@ impl Node {
         for k in 0..3 {
             self.planes[k].0[lane] = lo[k];
             self.planes[k + 3].0[lane] = hi[k];
+        }
+    }
+
+    /// Write down in which order rays meet the children: by the centres of their boxes along the diagonal of an octant.
+    pub fn sort(&mut self) {
+        for octant in 0..8 {
+            let sign = |k: usize| if octant >> k & 1 == 1 { -1.0 } else { 1.0 };
+            let along = |k: usize| (self.planes[k] + self.planes[k + 3]) * sign(k);
+            let key = (along(0) + along(1) + along(2)).0;
+            let mut lanes = [0, 1, 2, 3, 4, 5, 6, 7];
+            lanes.sort_by(|&a, &b| key[a as usize].total_cmp(&key[b as usize]));
+            self.order[octant] = lanes.iter().rev().fold(0, |bits, lane| bits << 4 | lane);
         }
     }
 
@@ -75,55 +84,46 @@ impl Node {
     /// Which children a ray enters before `t_max`, and where.
     #[inline(always)]
     pub fn entered(&self, ray: &Slab, t_max: f32) -> (u32, F8) {
-        let near = |k: usize| self.planes[ray.enter[k]] * ray.slope[k] + -ray.near[k];
-        let far = |k: usize| self.planes[(ray.enter[k] + 3) % 6] * ray.slope[k] + -ray.far[k];
+        let row = |k: usize| k + 3 * (ray.octant >> k & 1);
+        let near = |k: usize| self.planes[row(k)] * ray.slope[k] + -ray.near[k];
+        let far = |k: usize| self.planes[(row(k) + 3) % 6] * ray.slope[k] + -ray.far[k];
         let enter = near(0).max(near(1)).max(near(2).max(F8::splat(ray.t_min)));
         let leave = far(0).min(far(1)).min(far(2).min(F8::splat(t_max)));
         (leave.ge(enter).bitmask(), enter)
     }
 }
 
-/// Visit the leaves that a ray enters, nearest first. `leaf` gets a leaf and the last `t` of interest, and gives that `t` back,
-/// or a smaller one: −∞ ends the walk.
+/// What is done with leaves. No closure: those would not be compiled for the machine.
+pub(super) trait Visitor {
+    /// Gets a leaf and the last `t` of interest, and gives that `t` back, or a smaller one: −∞ ends the walk.
+    fn leaf<S: Lanes>(&mut self, leaf: u32, t_max: f32) -> f32;
+}
+
+/// Visit the leaves that a ray enters, about nearest first.
 #[inline(always)]
-pub(super) fn walk(nodes: &[Node], ray: &Slab, mut t_max: f32, mut leaf: impl FnMut(u32, f32) -> f32) {
-    let mut stack = [(0.0f32, 0u32); STACK];
-    let mut top = 0;
+pub(super) fn walk<S: Lanes>(nodes: &[Node], slab: &Slab, visitor: &mut impl Visitor) {
     if nodes.is_empty() {
         return;
     }
+    let (ray, mut t_max) = (S::ray(slab), slab.t_max);
+    let mut stack = Stack::new();
     let mut at = 0;
     loop {
         if at & LEAF == 0 {
-            let node = &nodes[at as usize];
-            let (mut bits, enter) = node.entered(ray, t_max);
-            let first = top;
-            while bits != 0 {
-                let lane = bits.trailing_zeros() as usize;
-                bits &= bits - 1;
-                // The farther, the deeper in the stack.
-                let item = (enter.0[lane], node.children[lane]);
-                let mut i = top;
-                while i > first && stack[i - 1].0 < item.0 {
-                    stack[i] = stack[i - 1];
-                    i -= 1;
-                }
-                stack[i] = item;
-                top += 1;
+            if let Some(child) = S::enter(&nodes[at as usize], &ray, t_max, &mut stack) {
+                at = child;
+                continue;
             }
         } else {
-            t_max = leaf(at & !LEAF, t_max);
+            t_max = visitor.leaf::<S>(at & !LEAF, t_max);
         }
-        loop {
-            if top == 0 {
-                return;
+        at = loop {
+            match stack.pop() {
+                None => return,
+                Some((t, at)) if t <= t_max => break at,
+                _ => {}
             }
-            top -= 1;
-            if stack[top].0 <= t_max {
-                break;
-            }
-        }
-        at = stack[top].1;
+        };
     }
 }
 

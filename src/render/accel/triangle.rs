@@ -10,7 +10,7 @@ use glam::Vec3;
 
 /// A ray as triangles see it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Shear<R> {
+pub struct Shear<R> {
     pub origin: [R; 3],
     /// Which axes are x, y and z of the sheared frame; z is the longest of the direction.
     pub axes: [usize; 3],
@@ -26,7 +26,8 @@ impl<R: Real> Shear<R> {
     #[inline(always)]
     pub fn new(ray: &Ray<R>) -> Self {
         let d = ray.direction;
-        let size = d.map(|x| Into::<f64>::into(x).abs());
+        let along = |k: usize| Into::<f64>::into(d[k]).abs();
+        let size = [along(0), along(1), along(2)];
         let z = if size[0] > size[1] && size[0] > size[2] { 0 } else { 1 + (size[1] <= size[2]) as usize };
         let (x, y) = ((z + 1) % 3, (z + 2) % 3);
         // A reflected frame would turn the winding round.
@@ -44,14 +45,25 @@ impl<R: Real> Shear<R> {
     /// A corner in the sheared frame.
     #[inline(always)]
     fn apply(&self, p: [f32; 3]) -> [R; 3] {
-        let d = self.axes.map(|k| R::from(p[k]) - self.origin[k]);
-        [d[0] - self.slope[0] * d[2], d[1] - self.slope[1] * d[2], d[2]]
+        let [x, y, z] = self.axes;
+        let depth = R::from(p[z]) - self.origin[z];
+        let x = (R::from(p[x]) - self.origin[x]) - self.slope[0] * depth;
+        let y = (R::from(p[y]) - self.origin[y]) - self.slope[1] * depth;
+        [x, y, depth]
     }
 
-    /// The hit with one triangle, edges and corners included; none in its own plane.
+    /// What one triangle has to say, edges and corners included; nothing in its own plane.
     #[inline(always)]
-    pub fn hit(&self, corners: [[f32; 3]; 3], object: u32, triangle: u32) -> Option<Hit<R>> {
-        let [a, b, c] = corners.map(|p| self.apply(p));
+    fn meet(&self, corners: [[f32; 3]; 3]) -> Option<Meeting<R>> {
+        let (a, b, c) = (self.apply(corners[0]), self.apply(corners[1]), self.apply(corners[2]));
+        // Surely missed?
+        let signs = |p: R, q: R| ((p > q) as u32) | ((p < q) as u32) << 1;
+        let sign = signs(c[0] * b[1], c[1] * b[0])
+            | signs(a[0] * c[1], a[1] * c[0])
+            | signs(b[0] * a[1], b[1] * a[0]);
+        if sign == 3 {
+            return None;
+        }
         let u = R::minor(c[0], b[1], c[1], b[0]);
         let v = R::minor(a[0], c[1], a[1], c[0]);
         let w = R::minor(b[0], a[1], b[1], a[0]);
@@ -59,21 +71,49 @@ impl<R: Real> Shear<R> {
             return None;
         }
         let det = u + v + w;
-        if det == 0.0 || det.is_nan() {
-            return None;
-        }
         let (za, zb, zc): (f64, f64, f64) = (a[2].into(), b[2].into(), c[2].into());
         let t = R::from_f64((u * za + v * zb + w * zc) / (det * self.depth));
-        let inside = t >= self.t_min && t <= self.t_max;
-        let (u, v) = (R::from_f64(v / det), R::from_f64(w / det));
-        inside.then_some(Hit { t, u, v, object, triangle, back: det < 0.0 })
+        (det != 0.0 && t >= self.t_min && t <= self.t_max).then_some(Meeting { t, v, w, det })
+    }
+}
+
+/// `t`, two edge functions and the sum of all three.
+struct Meeting<R> {
+    t: R,
+    v: f64,
+    w: f64,
+    det: f64,
+}
+
+/// Four of them.
+#[derive(Clone, Copy)]
+#[repr(C, align(32))]
+pub struct Meetings<R> {
+    pub v: [f64; 4],
+    pub w: [f64; 4],
+    pub det: [f64; 4],
+    pub t: [R; 4],
+}
+
+impl<R: Real> Meetings<R> {
+    #[inline(always)]
+    pub fn new() -> Self {
+        Self { v: [0.0; 4], w: [0.0; 4], det: [0.0; 4], t: [R::from(0.0); 4] }
+    }
+
+    /// The hit in one lane.
+    #[inline(always)]
+    pub fn hit(&self, lane: usize, object: u32, triangle: u32) -> Hit<R> {
+        let det = self.det[lane];
+        let (u, v) = (R::from_f64(self.v[lane] / det), R::from_f64(self.w[lane] / det));
+        Hit { t: self.t[lane], u, v, object, triangle, back: det < 0.0 }
     }
 }
 
 /// Four triangles side by side, what a leaf holds.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
-pub(super) struct Pack {
+pub struct Pack {
     /// Corner, axis, triangle.
     pub corners: [[[f32; 4]; 3]; 3],
     /// Which triangles; `EMPTY` where there is none, with corners of its neighbour.
@@ -107,7 +147,8 @@ impl Pack {
     /// The corners of one triangle.
     #[inline(always)]
     pub fn corners_of(&self, lane: usize) -> [[f32; 3]; 3] {
-        self.corners.map(|c| c.map(|axis| axis[lane]))
+        let at = |c: usize| [self.corners[c][0][lane], self.corners[c][1][lane], self.corners[c][2][lane]];
+        [at(0), at(1), at(2)]
     }
 
     /// Its box.
@@ -128,17 +169,17 @@ impl Pack {
         (Vec3::new(x.0, y.0, z.0), Vec3::new(x.1, y.1, z.1))
     }
 
-    /// Which of the four may be hit, a bit each: all but those that the signs of rounded edge functions rule out.
+    /// Which of the four are hit in `t_min…t_max`, a bit each.
     #[inline(always)]
-    pub fn candidates<R: Real>(&self, ray: &Shear<R>) -> u32 {
+    pub fn meet<R: Real>(&self, ray: &Shear<R>, out: &mut Meetings<R>) -> u32 {
         let mut bits = 0;
         for lane in 0..4 {
-            let [a, b, c] = self.corners_of(lane).map(|p| ray.apply(p));
-            let signs = |p: R, q: R| ((p > q) as u32) | ((p < q) as u32) << 1;
-            let all = signs(c[0] * b[1], c[1] * b[0])
-                | signs(a[0] * c[1], a[1] * c[0])
-                | signs(b[0] * a[1], b[1] * a[0]);
-            bits |= ((all != 3 && self.ids[lane] != EMPTY) as u32) << lane;
+            if self.ids[lane] != EMPTY
+                && let Some(m) = ray.meet(self.corners_of(lane))
+            {
+                (out.t[lane], out.v[lane], out.w[lane], out.det[lane]) = (m.t, m.v, m.w, m.det);
+                bits |= 1 << lane;
+            }
         }
         bits
     }

@@ -1,11 +1,13 @@
 //! Many surfaces, each as often as it is placed: a tree over objects, and a tree in each surface.
 
-use super::ray::{Hit, Ray, Real, Slab, above};
-use super::{Accel, Blocked, Kind, Nearest, build, each, tree};
-use crate::math::simd::{Isa, Kernel, run};
+use super::lanes::{Lanes, Machine, Work};
+use super::ray::{Hit, Ray, Real, Slab};
+use super::search::{Any, Nearest, Search};
+use super::{Accel, Kind, build, each, tree};
+use crate::math::simd::Isa;
 use build::{Item, Span};
 use glam::{DAffine3, DVec3, Vec3};
-use tree::Node;
+use tree::{Node, Visitor};
 
 /// Triangles as they stand now.
 #[derive(Clone, Copy, Debug)]
@@ -69,7 +71,7 @@ struct Object {
 /// All objects that a ray can meet.
 #[derive(Clone, Debug)]
 pub struct World {
-    isa: Isa,
+    machine: Machine,
     parts: Vec<Accel>,
     objects: Vec<Object>,
     span: Span,
@@ -89,7 +91,7 @@ impl World {
         // Small surfaces share the threads; a large one has them all.
         let parts = surfaces.iter().map(|s| Accel::new(kind, s.positions, s.triangles, threads));
         let mut world = Self {
-            isa: Isa::Best,
+            machine: Machine::new(Isa::Best),
             parts: parts.collect(),
             objects: placed.iter().map(|p| Object::new(*p)).collect(),
             span: Span::EMPTY,
@@ -103,7 +105,7 @@ impl World {
 
     /// The same with another build of the kernels; for tests and measurements.
     pub fn with_isa(self, isa: Isa) -> Self {
-        Self { isa, ..self }
+        Self { machine: Machine::new(isa), ..self }
     }
 
     /// The surfaces, in the order of [`World::new`].
@@ -168,78 +170,69 @@ impl World {
     /// `accept` must not change its mind: it may be asked about any hit, in any order.
     #[inline]
     pub fn nearest<R: Real>(&self, ray: &Ray<R>, accept: impl Fn(&Hit<R>) -> bool) -> Option<Hit<R>> {
-        run(self.isa, First { world: self, ray, accept: &accept })
+        self.machine.run(Query { world: self, ray, search: Nearest::new(accept) }).best
     }
 
     /// Whether `accept` takes any hit.
     #[inline]
     pub fn blocked<R: Real>(&self, ray: &Ray<R>, accept: impl Fn(&Hit<R>) -> bool) -> bool {
-        run(self.isa, Any { world: self, ray, accept: &accept })
+        self.machine.run(Query { world: self, ray, search: Any::new(accept) }).found
     }
+}
 
-    /// Visit objects that a ray may meet; `look` gives the last `t` that is still of interest.
+/// A search among all objects.
+struct Query<'a, R, Q> {
+    world: &'a World,
+    ray: &'a Ray<R>,
+    search: Q,
+}
+
+impl<R: Real, Q: Search<R>> Work for Query<'_, R, Q> {
+    type Output = Q;
     #[inline(always)]
-    fn visit<R: Real>(&self, ray: &Ray<R>, mut look: impl FnMut(u32, &Object, f32) -> f32) {
-        if let [only] = self.objects[..] {
-            look(0, &only, f32::INFINITY);
-            return;
+    fn run<S: Lanes>(mut self) -> Q {
+        let world = self.world;
+        // One object, where its positions are: no more than a search in its surface.
+        if let [Object { surface_from_world: None, placed, .. }] = &world.objects[..] {
+            let mut own = Own { object: &world.objects[0], search: &mut self.search };
+            world.parts[placed.surface].search::<S, R>(self.ray, 0, f32::INFINITY, &mut own);
+        } else if let Some(slab) = Slab::new(self.ray, &world.span, world.slack) {
+            tree::walk::<S>(&world.nodes, &slab, &mut self);
         }
-        let Some(slab) = Slab::new(ray, self.span.lo.into(), self.span.hi.into(), self.slack) else { return };
-        tree::walk(&self.nodes, &slab, slab.t_max, |leaf, t| {
-            let object = self.leaves[leaf as usize][0];
-            look(object, &self.objects[object as usize], t)
-        });
+        self.search
     }
 }
 
-struct First<'a, R, F> {
-    world: &'a World,
-    ray: &'a Ray<R>,
-    accept: F,
-}
-
-impl<R: Real, F: Fn(&Hit<R>) -> bool> Kernel for First<'_, R, F> {
-    type Output = Option<Hit<R>>;
+impl<R: Real, Q: Search<R>> Visitor for Query<'_, R, Q> {
     #[inline(always)]
-    fn run(self) -> Option<Hit<R>> {
-        let mut best: Option<Hit<R>> = None;
-        self.world.visit(self.ray, |id, object, t_max| {
-            let ray = object.own(self.ray, best.map_or(self.ray.t_max, |b| b.t));
-            let accept = |h: &Hit<R>| object.takes(h) && (self.accept)(&object.seen(*h));
-            let accel = &self.world.parts[object.placed.surface];
-            let mut found = best;
-            Nearest { accel, ray: &ray, object: id, accept, best: &mut found }.run();
-            match found {
-                Some(h) if best.is_none_or(|b| h.before(&b)) => {
-                    best = Some(object.seen(h));
-                    above(h.t)
-                }
-                _ => t_max,
-            }
-        });
-        best
+    fn leaf<S: Lanes>(&mut self, leaf: u32, t_max: f32) -> f32 {
+        let id = self.world.leaves[leaf as usize][0];
+        let object = &self.world.objects[id as usize];
+        let ray = object.own(self.ray);
+        let mut own = Own { object, search: &mut self.search };
+        self.world.parts[object.placed.surface].search::<S, R>(&ray, id, t_max, &mut own);
+        self.search.limit(t_max)
     }
 }
 
-struct Any<'a, R, F> {
-    world: &'a World,
-    ray: &'a Ray<R>,
-    accept: F,
+/// A search that sees the hits of one object as they are in the world.
+struct Own<'a, Q> {
+    object: &'a Object,
+    search: &'a mut Q,
 }
 
-impl<R: Real, F: Fn(&Hit<R>) -> bool> Kernel for Any<'_, R, F> {
-    type Output = bool;
+impl<R: Real, Q: Search<R>> Search<R> for Own<'_, Q> {
     #[inline(always)]
-    fn run(self) -> bool {
-        let mut found = false;
-        self.world.visit(self.ray, |id, object, t_max| {
-            let ray = object.own(self.ray, self.ray.t_max);
-            let accept = |h: &Hit<R>| object.takes(h) && (self.accept)(&object.seen(*h));
-            let accel = &self.world.parts[object.placed.surface];
-            found = Blocked { accel, ray: &ray, object: id, accept }.run();
-            if found { f32::NEG_INFINITY } else { t_max }
-        });
-        found
+    fn found(&mut self, hit: Hit<R>) {
+        let back = hit.back != self.object.flipped;
+        if !(back && self.object.placed.cull_back) {
+            self.search.found(Hit { back, ..hit });
+        }
+    }
+
+    #[inline(always)]
+    fn limit(&self, t_max: f32) -> f32 {
+        self.search.limit(t_max)
     }
 }
 
@@ -266,22 +259,11 @@ impl Object {
 
     /// A ray in the frame of the surface; `t` stays what it is.
     #[inline(always)]
-    fn own<R: Real>(&self, ray: &Ray<R>, t_max: R) -> Ray<R> {
-        let Some(m) = self.surface_from_world else { return Ray { t_max, ..*ray } };
+    fn own<R: Real>(&self, ray: &Ray<R>) -> Ray<R> {
+        let Some(m) = self.surface_from_world else { return *ray };
         let wide = |v: [R; 3]| DVec3::from_array(v.map(Into::into));
         let (o, d) = (m.transform_point3(wide(ray.origin)), m.transform_vector3(wide(ray.direction)));
         let narrow = |v: DVec3| v.to_array().map(R::from_f64);
-        Ray { origin: narrow(o), direction: narrow(d), t_max, ..*ray }
-    }
-
-    /// A hit as the world sees it.
-    #[inline(always)]
-    fn seen<R>(&self, hit: Hit<R>) -> Hit<R> {
-        Hit { back: hit.back != self.flipped, ..hit }
-    }
-
-    #[inline(always)]
-    fn takes<R>(&self, hit: &Hit<R>) -> bool {
-        !(self.placed.cull_back && hit.back != self.flipped)
+        Ray { origin: narrow(o), direction: narrow(d), ..*ray }
     }
 }
