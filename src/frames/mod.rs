@@ -31,7 +31,8 @@ use crate::fk::Posed;
 use crate::image::develop::Developer;
 use crate::image::{Image, Rgba8};
 use crate::render::raster::{IdImage, Stats};
-use crate::render::{Settings, Window};
+use crate::render::ray::Outcome;
+use crate::render::{Painter, Renderer, Settings, Window};
 use crate::scene::{Camera, Material, Object, Scene, Shape};
 use crate::skin::Deformed;
 use crate::time::{self, Range, Wrap};
@@ -61,6 +62,8 @@ pub struct ShotDesc {
     pub props: Props,
     /// What is drawn with the character.
     pub overlays: Overlays,
+    /// Who draws the character.
+    pub renderer: Renderer,
     /// Size and samples of the pictures.
     pub settings: Settings,
     /// The part of the pictures that is drawn: to the same bytes as in the whole.
@@ -78,6 +81,7 @@ impl Default for ShotDesc {
             look: Look::default(),
             props: Props::default(),
             overlays: Overlays::default(),
+            renderer: Renderer::default(),
             settings: Settings::default(),
             crop: None,
         }
@@ -142,6 +146,8 @@ pub struct FrameStats {
     pub vertices: usize,
     /// What the rasterizer counted.
     pub raster: Stats,
+    /// What rays did.
+    pub rays: Outcome,
     /// Where the time went.
     pub times: Times,
 }
@@ -162,6 +168,8 @@ impl std::ops::AddAssign for FrameStats {
         self.bones += o.bones;
         self.vertices += o.vertices;
         self.raster += o.raster;
+        self.rays.samples = o.rays.samples;
+        self.rays.count += o.rays.count;
         self.times.pose += o.times.pose;
         self.times.deform += o.times.deform;
         self.times.draw += o.times.draw;
@@ -279,7 +287,9 @@ impl<'a> Shot<'a> {
     ///
     /// Objects are the character's mesh instances, in order.
     pub fn draw_ids(&self, moment: impl Into<Moment>, worker: &mut Worker, out: &mut IdImage) -> FrameStats {
-        self.with_scene(moment.into(), worker, |scene, w| w.draw_ids(scene, &self.desc.settings, out))
+        self.with_scene(moment.into(), worker, |scene, w| {
+            w.rasterizer.draw_ids(scene, &self.desc.settings, out)
+        })
     }
 
     /// Pose and deform the character, and hand the scene of the moment to a renderer.
@@ -287,15 +297,18 @@ impl<'a> Shot<'a> {
         &self,
         moment: Moment,
         worker: &mut Worker,
-        draw: impl FnOnce(&Scene, &mut crate::render::raster::Rasterizer) -> Stats,
+        draw: impl FnOnce(&Scene, &mut Painter) -> Stats,
     ) -> FrameStats {
         let mut stats = FrameStats::default();
         self.pose(moment.time, worker, &mut stats);
         let start = Instant::now();
         let camera = self.stand.camera(moment, &worker.posed, &worker.deformed);
         let scene = self.scene(camera, &worker.posed, &worker.deformed);
-        worker.rasterizer.set_window(self.desc.crop);
-        stats.raster = draw(&scene, &mut worker.rasterizer);
+        let painter = &mut worker.painter;
+        painter.set_window(self.desc.crop);
+        (painter.renderer, painter.outcome) = (self.desc.renderer, Outcome::default());
+        stats.raster = draw(&scene, painter);
+        stats.rays = painter.outcome;
         stats.times.draw = start.elapsed();
         stats
     }

@@ -6,6 +6,7 @@ pub mod channel;
 pub mod footprint;
 mod material;
 pub mod outline;
+mod painter;
 mod sample;
 mod shade;
 pub mod shadow;
@@ -18,6 +19,8 @@ pub mod raster;
 
 #[allow(clippy::needless_range_loop)]
 pub mod ray;
+
+pub use painter::{Painter, Renderer, Watch};
 
 /// How a picture is made; what is on it is the [`Scene`](crate::scene::Scene).
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -200,6 +200,20 @@ impl<'a, R: Real> Stage<'a, R> {
         }
     }
 
+    /// What a path shows that meets nothing: the background, and in a mirror, where that is nothing, the ambient light.
+    pub fn beyond(&self, path: &Path) -> (DVec3, f64) {
+        let [r, g, b, a] = self.background.map(f64::from);
+        let behind = DVec3::new(r, g, b);
+        match &self.coat {
+            Coat::Scene(scene) if path.bounce > 0 && path.cover == 0.0 => {
+                let (above, up) = (scene.ambient.as_dvec3(), path.direction.normalize_or(DVec3::Y).y);
+                let below = scene.style.below.map_or(above, |b| b.as_dvec3());
+                (behind + below.lerp(above, 0.5 + 0.5 * up) * (1.0 - a), a)
+            }
+            _ => (behind, a),
+        }
+    }
+
     /// What an object is made of.
     pub fn finish(&self, object: u32) -> &Finish {
         let n = self.bodies.len();
