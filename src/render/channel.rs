@@ -54,6 +54,21 @@ pub struct Channels {
     pub uvs: Vec<Vec2>,
 }
 
+/// Object, triangle and depth of each pixel's centre, row by row from the top left.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct IdImage {
+    /// Pixels a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Index of the object plus one; 0 where nothing is.
+    pub objects: Vec<u32>,
+    /// Index of the triangle in its mesh; 0 where nothing is.
+    pub triangles: Vec<u32>,
+    /// Distance along the view direction, metres; infinite where nothing is.
+    pub depth: Vec<f32>,
+}
+
 impl Channels {
     /// Take the size of a picture, and hold what is asked for; all pixels are empty.
     pub fn reset(&mut self, width: usize, height: usize, wanted: &[Channel]) {

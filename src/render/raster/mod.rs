@@ -32,8 +32,9 @@ mod tile;
 mod vertex;
 mod window;
 
+pub use super::channel::IdImage;
 use super::channel::{Channel, Channels};
-use super::{Settings, Window};
+use super::{Settings, Window, each};
 use crate::image::{Image, Rgba8};
 use crate::math::simd::{self, Isa};
 use crate::scene::Scene;
@@ -45,21 +46,6 @@ use window::View;
 
 /// Pixels along a tile's side.
 pub(crate) const TILE: usize = 64;
-
-/// Object, triangle and depth of each pixel's centre, row by row from the top left.
-#[derive(Clone, Debug, PartialEq, Default)]
-pub struct IdImage {
-    /// Pixels a row.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// Index of the object plus one; 0 where nothing is.
-    pub objects: Vec<u32>,
-    /// Index of the triangle in its mesh; 0 where nothing is.
-    pub triangles: Vec<u32>,
-    /// Distance along the view direction, metres; infinite where nothing is.
-    pub depth: Vec<f32>,
-}
 
 /// What was done for a picture, counted exactly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -234,14 +220,14 @@ impl Rasterizer {
         self.bins.resize_with(threads.max(self.bins.len()), Bins::default);
         let (isa, vertices) = (self.isa, &self.vertices);
         let shares: Vec<(usize, &mut Bins)> = self.bins[..threads].iter_mut().enumerate().collect();
-        each(shares, threads, |(k, bins)| bins.fill(isa, &frame, vertices, k, threads));
+        each(shares, |(k, bins)| bins.fill(isa, &frame, vertices, k, threads));
 
         // Draw the rows of tiles.
         self.tiles.resize_with(threads.max(self.tiles.len()), TileScratch::default);
         let bins = &self.bins[..threads];
         let rows = std::sync::Mutex::new((tiles.y / TILE..).zip(bands));
         let workers: Vec<&mut TileScratch> = self.tiles[..threads].iter_mut().collect();
-        each(workers, threads, |scratch| {
+        each(workers, |scratch| {
             scratch.stats = Stats::default();
             loop {
                 let next = rows.lock().expect("no worker panics").next();
@@ -253,16 +239,4 @@ impl Rasterizer {
         self.tiles[..threads].iter().for_each(|t| stats += t.stats);
         stats
     }
-}
-
-/// Do every task, each on its own thread if there is more than one.
-fn each<T: Send>(tasks: Vec<T>, threads: usize, work: impl Fn(T) + Sync) {
-    if threads <= 1 {
-        return tasks.into_iter().for_each(work);
-    }
-    std::thread::scope(|s| {
-        for task in tasks {
-            s.spawn(|| work(task));
-        }
-    });
 }

@@ -1,0 +1,192 @@
+//! Ray against triangle without gaps: Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013.
+//!
+//! The ray becomes the z axis: its longest axis by permutation, the others by shearing. A corner is sheared the same way in every
+//! triangle that it belongs to, and the sign of an edge function is the exact one, so two triangles at an edge cannot both deny
+//! a ray. Edge functions in the ray's own precision only sort out what is surely missed: `fl(ab) > fl(cd)` implies `ab > cd`.
+//! What remains is computed once more with exact products, so that `t` and the weights are as good for slivers.
+
+use super::ray::{Hit, REACH, Ray, Real};
+use glam::Vec3;
+
+/// A ray as triangles see it.
+#[derive(Clone, Copy, Debug)]
+pub struct Shear<R> {
+    pub origin: [R; 3],
+    /// Which axes are x, y and z of the sheared frame; z is the longest of the direction.
+    pub axes: [usize; 3],
+    /// Shear of x and of y.
+    pub slope: [R; 2],
+    /// Length along z of one unit of `t`.
+    pub depth: f64,
+    pub t_min: R,
+    pub t_max: R,
+}
+
+impl<R: Real> Shear<R> {
+    #[inline(always)]
+    pub fn new(ray: &Ray<R>) -> Self {
+        let d = ray.direction;
+        let along = |k: usize| Into::<f64>::into(d[k]).abs();
+        let size = [along(0), along(1), along(2)];
+        let z = if size[0] > size[1] && size[0] > size[2] { 0 } else { 1 + (size[1] <= size[2]) as usize };
+        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
+        // A reflected frame would turn the winding round.
+        let axes = if Into::<f64>::into(d[z]) < 0.0 { [y, x, z] } else { [x, y, z] };
+        Self {
+            origin: ray.origin,
+            axes,
+            slope: [d[axes[0]] / d[z], d[axes[1]] / d[z]],
+            depth: d[z].into(),
+            t_min: ray.t_min,
+            t_max: ray.t_max,
+        }
+    }
+
+    /// A corner in the sheared frame.
+    #[inline(always)]
+    fn apply(&self, p: [f32; 3]) -> [R; 3] {
+        let [x, y, z] = self.axes;
+        let depth = R::from(p[z]) - self.origin[z];
+        let x = (R::from(p[x]) - self.origin[x]) - self.slope[0] * depth;
+        let y = (R::from(p[y]) - self.origin[y]) - self.slope[1] * depth;
+        [x, y, depth]
+    }
+
+    /// What one triangle has to say, edges and corners included; nothing in its own plane.
+    #[inline(always)]
+    fn meet(&self, corners: [[f32; 3]; 3]) -> Option<Meeting<R>> {
+        let (a, b, c) = (self.apply(corners[0]), self.apply(corners[1]), self.apply(corners[2]));
+        // Surely missed?
+        let signs = |p: R, q: R| ((p > q) as u32) | ((p < q) as u32) << 1;
+        let sign = signs(c[0] * b[1], c[1] * b[0])
+            | signs(a[0] * c[1], a[1] * c[0])
+            | signs(b[0] * a[1], b[1] * a[0]);
+        if sign == 3 {
+            return None;
+        }
+        let u = R::minor(c[0], b[1], c[1], b[0]);
+        let v = R::minor(a[0], c[1], a[1], c[0]);
+        let w = R::minor(b[0], a[1], b[1], a[0]);
+        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
+            return None;
+        }
+        let det = u + v + w;
+        let (za, zb, zc): (f64, f64, f64) = (a[2].into(), b[2].into(), c[2].into());
+        let t = R::from_f64((u * za + v * zb + w * zc) / (det * self.depth));
+        (det != 0.0 && t >= self.t_min && t <= self.t_max).then_some(Meeting { t, v, w, det })
+    }
+}
+
+/// `t`, two edge functions and the sum of all three.
+struct Meeting<R> {
+    t: R,
+    v: f64,
+    w: f64,
+    det: f64,
+}
+
+/// Four of them.
+#[derive(Clone, Copy)]
+#[repr(C, align(32))]
+pub struct Meetings<R> {
+    pub v: [f64; 4],
+    pub w: [f64; 4],
+    pub det: [f64; 4],
+    pub t: [R; 4],
+}
+
+impl<R: Real> Meetings<R> {
+    #[inline(always)]
+    pub fn new() -> Self {
+        Self { v: [0.0; 4], w: [0.0; 4], det: [0.0; 4], t: [R::from(0.0); 4] }
+    }
+
+    /// The hit in one lane.
+    #[inline(always)]
+    pub fn hit(&self, lane: usize, object: u32, triangle: u32) -> Hit<R> {
+        let det = self.det[lane];
+        let (u, v) = (R::from_f64(self.v[lane] / det), R::from_f64(self.w[lane] / det));
+        Hit { t: self.t[lane], u, v, object, triangle, back: det < 0.0 }
+    }
+}
+
+/// Four triangles side by side, what a leaf holds.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(32))]
+pub struct Pack {
+    /// Corner, axis, triangle.
+    pub corners: [[[f32; 4]; 3]; 3],
+    /// Which triangles; `EMPTY` where there is none, with corners of its neighbour.
+    pub ids: [u32; 4],
+}
+
+/// No triangle.
+pub(super) const EMPTY: u32 = u32::MAX;
+
+impl Pack {
+    /// Of up to four triangles of a mesh.
+    #[inline(always)]
+    pub fn new(positions: &[Vec3], triangles: &[[u32; 3]], ids: [u32; 4]) -> Self {
+        let mut pack = Self { corners: [[[0.0; 4]; 3]; 3], ids };
+        pack.fill(positions, triangles);
+        pack
+    }
+
+    /// Take the corners from where they stand now.
+    #[inline(always)]
+    pub fn fill(&mut self, positions: &[Vec3], triangles: &[[u32; 3]]) {
+        for lane in 0..4 {
+            let id = if self.ids[lane] == EMPTY { self.ids[0] } else { self.ids[lane] };
+            for (corner, &i) in self.corners.iter_mut().zip(&triangles[id as usize]) {
+                let p = standing(positions[i as usize]);
+                (corner[0][lane], corner[1][lane], corner[2][lane]) = (p.x, p.y, p.z);
+            }
+        }
+    }
+
+    /// The corners of one triangle.
+    #[inline(always)]
+    pub fn corners_of(&self, lane: usize) -> [[f32; 3]; 3] {
+        let at = |c: usize| [self.corners[c][0][lane], self.corners[c][1][lane], self.corners[c][2][lane]];
+        [at(0), at(1), at(2)]
+    }
+
+    /// Its box.
+    #[inline(always)]
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        let c = &self.corners;
+        let axis = |k: usize| {
+            let (mut lo, mut hi) = (c[0][k], c[0][k]);
+            for corner in &c[1..] {
+                for lane in 0..4 {
+                    lo[lane] = lo[lane].min(corner[k][lane]);
+                    hi[lane] = hi[lane].max(corner[k][lane]);
+                }
+            }
+            (lo.into_iter().reduce(f32::min).unwrap_or(0.0), hi.into_iter().reduce(f32::max).unwrap_or(0.0))
+        };
+        let [x, y, z] = [0, 1, 2].map(axis);
+        (Vec3::new(x.0, y.0, z.0), Vec3::new(x.1, y.1, z.1))
+    }
+
+    /// Which of the four are hit in `t_min…t_max`, a bit each.
+    #[inline(always)]
+    pub fn meet<R: Real>(&self, ray: &Shear<R>, out: &mut Meetings<R>) -> u32 {
+        let mut bits = 0;
+        for lane in 0..4 {
+            if self.ids[lane] != EMPTY
+                && let Some(m) = ray.meet(self.corners_of(lane))
+            {
+                (out.t[lane], out.v[lane], out.w[lane], out.det[lane]) = (m.t, m.v, m.w, m.det);
+                bits |= 1 << lane;
+            }
+        }
+        bits
+    }
+}
+
+/// Where a vertex is taken to stand: at the origin if it is nowhere, or too far for its products to be finite.
+#[inline(always)]
+pub(super) fn standing(p: Vec3) -> Vec3 {
+    if p.abs().cmple(Vec3::splat(REACH)).all() { p } else { Vec3::ZERO }
+}
