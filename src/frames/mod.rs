@@ -1,6 +1,7 @@
 //! Times to pictures: the one place where animation meets rendering.
 
 mod bones;
+mod brush;
 mod channels;
 mod effects;
 mod fit;
@@ -16,6 +17,7 @@ mod stroke;
 mod view;
 mod worker;
 
+pub use brush::Watch;
 pub use channels::Extent;
 pub use framing::{Framing, Turns};
 pub use look::{GroundLook, Look, Shading, Shadows};
@@ -30,11 +32,14 @@ use crate::character::Instance;
 use crate::fk::Posed;
 use crate::image::develop::Developer;
 use crate::image::{Image, Rgba8};
-use crate::render::raster::{IdImage, Stats};
-use crate::render::{Settings, Window};
+use crate::render::channel::IdImage;
+use crate::render::raster::Stats;
+use crate::render::ray::RayCount;
+use crate::render::{Renderer, Settings, Window};
 use crate::scene::{Camera, Material, Object, Scene, Shape};
 use crate::skin::Deformed;
 use crate::time::{self, Range, Wrap};
+use brush::Brush;
 use effects::Stage;
 use fit::Span;
 use glam::DVec3;
@@ -61,8 +66,10 @@ pub struct ShotDesc {
     pub props: Props,
     /// What is drawn with the character.
     pub overlays: Overlays,
-    /// Size and samples of the pictures.
+    /// Size of the pictures, and samples of the rasterizer's.
     pub settings: Settings,
+    /// What draws the character; bones and paths on it are always the rasterizer's.
+    pub renderer: Renderer,
     /// The part of the pictures that is drawn: to the same bytes as in the whole.
     pub crop: Option<Window>,
 }
@@ -79,6 +86,7 @@ impl Default for ShotDesc {
             props: Props::default(),
             overlays: Overlays::default(),
             settings: Settings::default(),
+            renderer: Renderer::default(),
             crop: None,
         }
     }
@@ -142,6 +150,10 @@ pub struct FrameStats {
     pub vertices: usize,
     /// What the rasterizer counted.
     pub raster: Stats,
+    /// Rays that were sent.
+    pub rays: RayCount,
+    /// Fewest and most samples a pixel among pictures by rays; zeros without any.
+    pub samples: [u32; 2],
     /// Where the time went.
     pub times: Times,
 }
@@ -162,6 +174,11 @@ impl std::ops::AddAssign for FrameStats {
         self.bones += o.bones;
         self.vertices += o.vertices;
         self.raster += o.raster;
+        self.rays += o.rays;
+        self.samples = match (self.samples, o.samples) {
+            ([_, 0], s) | (s, [_, 0]) => s,
+            ([a, b], [c, d]) => [a.min(c), b.max(d)],
+        };
         self.times.pose += o.times.pose;
         self.times.deform += o.times.deform;
         self.times.draw += o.times.draw;
@@ -227,10 +244,13 @@ impl<'a> Shot<'a> {
         ground_point(self.asset, self.desc.clip)
     }
 
-    /// Names of the objects that pixels may show, in order: those of the meshes that the character's instances wear.
+    /// Names of the objects that pixels may show, in order: those of the meshes that the character's instances wear, and, where rays
+    /// draw, shapes.
     pub fn object_names(&self) -> Vec<String> {
         let character = &self.asset.character;
-        character.instances().iter().map(|i| character.mesh(i).name.clone()).collect()
+        let meshes = character.instances().iter().map(|i| character.mesh(i).name.clone());
+        let shapes = if self.desc.renderer == Renderer::Raster { 0 } else { self.shapes.len() };
+        meshes.chain((1..=shapes).map(|i| format!("shape {i}"))).collect()
     }
 
     /// Pixels a row, and rows, of its pictures.
@@ -248,8 +268,9 @@ impl<'a> Shot<'a> {
     /// Draw a moment with the buffers of `worker`.
     pub fn draw(&self, moment: impl Into<Moment>, worker: &mut Worker, out: &mut Rgba8) -> FrameStats {
         if self.desc.look.is_direct() && self.desc.overlays.is_empty() {
-            return self
-                .with_scene(moment.into(), worker, |scene, w| w.draw(scene, &self.desc.settings, out));
+            return self.with_scene(moment.into(), worker, |scene, b| {
+                b.draw(&self.desc.renderer, scene, &self.desc.settings, out)
+            });
         }
         // What a grade makes of a pixel may depend on its neighbours and on its place.
         let window = self.desc.crop.filter(|_| self.desc.look.is_direct());
@@ -279,7 +300,10 @@ impl<'a> Shot<'a> {
     ///
     /// Objects are the character's mesh instances, in order.
     pub fn draw_ids(&self, moment: impl Into<Moment>, worker: &mut Worker, out: &mut IdImage) -> FrameStats {
-        self.with_scene(moment.into(), worker, |scene, w| w.draw_ids(scene, &self.desc.settings, out))
+        self.with_scene(moment.into(), worker, |scene, b| FrameStats {
+            raster: b.rasterizer.draw_ids(scene, &self.desc.settings, out),
+            ..FrameStats::default()
+        })
     }
 
     /// Pose and deform the character, and hand the scene of the moment to a renderer.
@@ -287,15 +311,15 @@ impl<'a> Shot<'a> {
         &self,
         moment: Moment,
         worker: &mut Worker,
-        draw: impl FnOnce(&Scene, &mut crate::render::raster::Rasterizer) -> Stats,
+        draw: impl FnOnce(&Scene, &mut Brush) -> FrameStats,
     ) -> FrameStats {
         let mut stats = FrameStats::default();
         self.pose(moment.time, worker, &mut stats);
         let start = Instant::now();
         let camera = self.stand.camera(moment, &worker.posed, &worker.deformed);
         let scene = self.scene(camera, &worker.posed, &worker.deformed);
-        worker.rasterizer.set_window(self.desc.crop);
-        stats.raster = draw(&scene, &mut worker.rasterizer);
+        worker.brush.set_window(self.desc.crop);
+        stats += draw(&scene, &mut worker.brush);
         stats.times.draw = start.elapsed();
         stats
     }

@@ -61,6 +61,10 @@ impl Totals {
             ("triangles binned", d.raster.drawn),
             ("samples covered", d.raster.samples),
             ("pixels shaded", d.raster.shaded),
+            ("rays from the eye", d.rays.primary),
+            ("rays to lamps", d.rays.shadow),
+            ("rays sent on", d.rays.secondary),
+            ("hits shaded", d.rays.shaded),
             ("bytes encoded", self.bytes),
         ];
         let times = [

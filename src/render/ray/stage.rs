@@ -59,6 +59,7 @@ pub(super) struct Stage<'a, R: Real> {
     pub lamps: Vec<Lamp<R>>,
     pub coat: Coat<'a, R>,
     pub background: [f32; 4],
+    pub sky: Option<[Vec3; 2]>,
 }
 
 /// What a ray meets. Objects beyond the bodies are solids.
@@ -178,6 +179,7 @@ impl<'a, R: Real> Stage<'a, R> {
             lamps: scene.lights.iter().map(Lamp::from).collect(),
             coat: Coat::Scene(scene),
             background: scene.background,
+            sky: scene.style.sky,
         }
     }
 
@@ -197,6 +199,7 @@ impl<'a, R: Real> Stage<'a, R> {
             lamps: scene.lights.iter().map(lamp_of).collect(),
             coat: Coat::plain(scene),
             background: [0.0, 0.0, 0.0, 1.0],
+            sky: None,
         }
     }
 

@@ -83,7 +83,13 @@ impl Wave {
             match known(path).unwrap_or_else(|| stage.nearest(path, f64::INFINITY, true)) {
                 Some(hit) => self.hits.push((hit, i as u32)),
                 None => {
-                    let [r, g, b, a] = stage.background.map(f64::from);
+                    let [r, g, b, a] = match stage.sky {
+                        Some([above, below]) if path.bounce > 0 => {
+                            let up = 0.5 + 0.5 * path.direction.normalize_or_zero().y as f32;
+                            below.lerp(above, up).extend(1.0).to_array().map(f64::from)
+                        }
+                        _ => stage.background.map(f64::from),
+                    };
                     add(
                         &mut self.sums[path.place as usize],
                         path.weight * DVec3::new(r, g, b),
