@@ -71,13 +71,12 @@ impl Shot<'_> {
             let character = &self.asset.character;
             self.labels.get_or_init(|| character.instances().iter().map(|i| labels(character, i)).collect());
         }
-        let stats = self.with_scene(moment.into(), worker, |scene, brush| {
-            let by = &self.desc.renderer;
-            let stats = brush.draw_channels(by, scene, settings, wanted, out);
+        let stats = self.with_scene(moment.into(), worker, |scene, painter| {
+            let stats = painter.draw_channels(scene, settings, wanted, out);
             if let Some(materials) = &solid {
                 let mut all = Channels::default();
                 let scene = Scene { materials, ..scene.clone() };
-                brush.draw_channels(by, &scene, settings, wanted, &mut all);
+                painter.draw_channels(&scene, settings, wanted, &mut all);
                 let empty = (0..all.objects.len()).filter(|&i| out.objects[i] == 0).collect::<Vec<_>>();
                 empty.into_iter().for_each(|i| out.copy_pixel(i, &all, i));
             }

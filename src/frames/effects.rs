@@ -1,16 +1,14 @@
 //! What a picture needs beside its scene: shadows, ground, contours, finer sampling.
 
-use super::brush::Brush;
 use super::fit::{self, Span};
 use super::look::{GroundLook, Look, Shadows};
-use super::{FrameStats, ShotDesc, Worker};
+use super::{ShotDesc, Worker};
 use crate::image::Image;
 use crate::render::backdrop::{Backdrop, Ground};
-use crate::render::channel::IdImage;
 use crate::render::footprint::Footprint;
-use crate::render::raster::Stats;
+use crate::render::raster::{IdImage, Stats};
 use crate::render::shadow::{ShadowDesc, ShadowMaker};
-use crate::render::{Renderer, Settings};
+use crate::render::{Painter, Renderer, Settings};
 use crate::scene::{AlphaMode, Camera, LightKind, Material, Projection, Scene, ShadowMap};
 use glam::Vec3;
 
@@ -71,14 +69,13 @@ impl Stage {
         &self,
         desc: &ShotDesc,
         scene: &Scene,
-        brush: &mut Brush,
+        painter: &mut Painter,
         effects: &mut Effects,
         out: &mut Image,
-    ) -> FrameStats {
+    ) -> Stats {
         let (look, settings) = (&desc.look, &desc.settings);
         let caster = Scene { materials: &self.solid, ..scene.clone() };
-        let mut stats =
-            FrameStats { raster: self.shadows(look, settings, &caster, effects), ..Default::default() };
+        let mut stats = self.shadows(look, settings, &caster, effects);
         let mut scene = Scene { background: [0.0; 4], ..scene.clone() };
         let Effects { key, fine, ids, .. } = effects;
         if look.shadows == Shadows::Map && key.size > 0 && desc.renderer == Renderer::Raster {
@@ -89,9 +86,9 @@ impl Stage {
         let finer = if look.tones().is_some() || look.outline.is_some() { FINER } else { 1 };
         let large = Settings { width: finer * settings.width, height: finer * settings.height, ..*settings };
         if finer == 1 || large.check().is_err() {
-            stats += self.figure(desc, &scene, &caster, settings, 1.0, brush, ids, out);
+            stats += self.figure(look, &scene, &caster, settings, 1.0, painter, ids, out);
         } else {
-            stats += self.figure(desc, &scene, &caster, &large, finer as f32, brush, ids, fine);
+            stats += self.figure(look, &scene, &caster, &large, finer as f32, painter, ids, fine);
             average(fine, finer, out);
         }
         stats
@@ -124,18 +121,18 @@ impl Stage {
     /// The scene, and its contours `scale` times as wide as asked for.
     fn figure(
         &self,
-        desc: &ShotDesc,
+        look: &Look,
         scene: &Scene,
         caster: &Scene,
         settings: &Settings,
         scale: f32,
-        brush: &mut Brush,
+        painter: &mut Painter,
         ids: &mut IdImage,
         out: &mut Image,
-    ) -> FrameStats {
-        let mut stats = brush.draw_linear(&desc.renderer, scene, settings, out);
-        if let Some(mut line) = desc.look.outline {
-            stats.raster += brush.rasterizer.draw_ids(caster, settings, ids);
+    ) -> Stats {
+        let mut stats = painter.draw_linear(scene, settings, out);
+        if let Some(mut line) = look.outline {
+            stats += painter.rasterizer.draw_ids(caster, settings, ids);
             line.width *= scale;
             let (slope, perspective) = match scene.camera.projection {
                 Projection::Perspective { fov_y } => (2.0 * (0.5 * fov_y).tan(), true),

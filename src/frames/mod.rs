@@ -1,7 +1,6 @@
 //! Times to pictures: the one place where animation meets rendering.
 
 mod bones;
-mod brush;
 mod channels;
 mod effects;
 mod fit;
@@ -17,7 +16,6 @@ mod stroke;
 mod view;
 mod worker;
 
-pub use brush::Watch;
 pub use channels::Extent;
 pub use framing::{Framing, Turns};
 pub use look::{GroundLook, Look, Shading, Shadows};
@@ -32,14 +30,12 @@ use crate::character::Instance;
 use crate::fk::Posed;
 use crate::image::develop::Developer;
 use crate::image::{Image, Rgba8};
-use crate::render::channel::IdImage;
-use crate::render::raster::Stats;
-use crate::render::ray::RayCount;
-use crate::render::{Renderer, Settings, Window};
+use crate::render::raster::{IdImage, Stats};
+use crate::render::ray::Outcome;
+use crate::render::{Painter, Renderer, Settings, Window};
 use crate::scene::{Camera, Material, Object, Scene, Shape};
 use crate::skin::Deformed;
 use crate::time::{self, Range, Wrap};
-use brush::Brush;
 use effects::Stage;
 use fit::Span;
 use glam::DVec3;
@@ -66,10 +62,10 @@ pub struct ShotDesc {
     pub props: Props,
     /// What is drawn with the character.
     pub overlays: Overlays,
-    /// Size of the pictures, and samples of the rasterizer's.
-    pub settings: Settings,
-    /// What draws the character; bones and paths on it are always the rasterizer's.
+    /// Who draws the character.
     pub renderer: Renderer,
+    /// Size and samples of the pictures.
+    pub settings: Settings,
     /// The part of the pictures that is drawn: to the same bytes as in the whole.
     pub crop: Option<Window>,
 }
@@ -85,8 +81,8 @@ impl Default for ShotDesc {
             look: Look::default(),
             props: Props::default(),
             overlays: Overlays::default(),
-            settings: Settings::default(),
             renderer: Renderer::default(),
+            settings: Settings::default(),
             crop: None,
         }
     }
@@ -150,10 +146,8 @@ pub struct FrameStats {
     pub vertices: usize,
     /// What the rasterizer counted.
     pub raster: Stats,
-    /// Rays that were sent.
-    pub rays: RayCount,
-    /// Fewest and most samples a pixel among pictures by rays; zeros without any.
-    pub samples: [u32; 2],
+    /// What rays did.
+    pub rays: Outcome,
     /// Where the time went.
     pub times: Times,
 }
@@ -174,11 +168,12 @@ impl std::ops::AddAssign for FrameStats {
         self.bones += o.bones;
         self.vertices += o.vertices;
         self.raster += o.raster;
-        self.rays += o.rays;
-        self.samples = match (self.samples, o.samples) {
-            ([_, 0], s) | (s, [_, 0]) => s,
-            ([a, b], [c, d]) => [a.min(c), b.max(d)],
+        // The fewest of any picture.
+        self.rays.samples = match self.rays.samples {
+            0 => o.rays.samples,
+            n => n.min(o.rays.samples.max(1)),
         };
+        self.rays.count += o.rays.count;
         self.times.pose += o.times.pose;
         self.times.deform += o.times.deform;
         self.times.draw += o.times.draw;
@@ -268,9 +263,8 @@ impl<'a> Shot<'a> {
     /// Draw a moment with the buffers of `worker`.
     pub fn draw(&self, moment: impl Into<Moment>, worker: &mut Worker, out: &mut Rgba8) -> FrameStats {
         if self.desc.look.is_direct() && self.desc.overlays.is_empty() {
-            return self.with_scene(moment.into(), worker, |scene, b| {
-                b.draw(&self.desc.renderer, scene, &self.desc.settings, out)
-            });
+            return self
+                .with_scene(moment.into(), worker, |scene, w| w.draw(scene, &self.desc.settings, out));
         }
         // What a grade makes of a pixel may depend on its neighbours and on its place.
         let window = self.desc.crop.filter(|_| self.desc.look.is_direct());
@@ -300,9 +294,8 @@ impl<'a> Shot<'a> {
     ///
     /// Objects are the character's mesh instances, in order.
     pub fn draw_ids(&self, moment: impl Into<Moment>, worker: &mut Worker, out: &mut IdImage) -> FrameStats {
-        self.with_scene(moment.into(), worker, |scene, b| FrameStats {
-            raster: b.rasterizer.draw_ids(scene, &self.desc.settings, out),
-            ..FrameStats::default()
+        self.with_scene(moment.into(), worker, |scene, w| {
+            w.rasterizer.draw_ids(scene, &self.desc.settings, out)
         })
     }
 
@@ -311,15 +304,18 @@ impl<'a> Shot<'a> {
         &self,
         moment: Moment,
         worker: &mut Worker,
-        draw: impl FnOnce(&Scene, &mut Brush) -> FrameStats,
+        draw: impl FnOnce(&Scene, &mut Painter) -> Stats,
     ) -> FrameStats {
         let mut stats = FrameStats::default();
         self.pose(moment.time, worker, &mut stats);
         let start = Instant::now();
         let camera = self.stand.camera(moment, &worker.posed, &worker.deformed);
         let scene = self.scene(camera, &worker.posed, &worker.deformed);
-        worker.brush.set_window(self.desc.crop);
-        stats += draw(&scene, &mut worker.brush);
+        let painter = &mut worker.painter;
+        painter.set_window(self.desc.crop);
+        (painter.renderer, painter.outcome) = (self.desc.renderer, Outcome::default());
+        stats.raster = draw(&scene, painter);
+        stats.rays = painter.outcome;
         stats.times.draw = start.elapsed();
         stats
     }

@@ -1,9 +1,9 @@
 //! Where the character stands in its pictures, and whether its clip comes back to where it began.
 
-use super::FrameStats;
 use super::fit::{self, Span};
 use super::{Moment, Shot, Worker};
 use crate::asset::Asset;
+use crate::render::raster::Stats;
 use crate::scene::Camera;
 use crate::time;
 use glam::{DAffine3, DVec3};
@@ -41,7 +41,7 @@ impl Shot<'_> {
         let mut camera: Option<Camera> = None;
         self.with_scene(moment.into(), worker, |scene, _| {
             camera = Some(scene.camera);
-            FrameStats::default()
+            Stats::default()
         });
         let settings = &self.desc.settings;
         let aspect = settings.width as f32 / settings.height.max(1) as f32;

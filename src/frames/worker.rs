@@ -1,12 +1,12 @@
 //! What one thread works with.
 
-use super::brush::{Brush, Watch};
 use super::effects::Effects;
 use crate::asset::Asset;
 use crate::character::{LastDeform, Scratch};
 use crate::fk::{self, Posed};
 use crate::image::Image;
 use crate::pose::Pose;
+use crate::render::Painter;
 use crate::skin::Deformed;
 use glam::DVec3;
 
@@ -20,7 +20,8 @@ pub struct Worker {
     /// What `deformed` was made by, and for which shot.
     last: Vec<LastDeform>,
     shot: u64,
-    pub(super) brush: Brush,
+    /// Draws; whoever wants to watch a picture by rays come along says so here.
+    pub painter: Painter,
     pub(super) effects: Effects,
     /// A picture on its way to 8 bits, and one that is put on it.
     pub(super) light: Image,
@@ -28,11 +29,6 @@ pub struct Worker {
 }
 
 impl Worker {
-    /// Let `watch` follow the pictures that rays draw from now on, until it is replaced.
-    pub fn set_watch(&mut self, watch: Option<Box<Watch>>) {
-        self.brush.watch = watch;
-    }
-
     pub(super) fn evaluate(&mut self, asset: &Asset, clip: Option<usize>, t: f64) {
         let character = &asset.character;
         self.pose = character.pose(clip, t);

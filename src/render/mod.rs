@@ -6,6 +6,7 @@ pub mod channel;
 pub mod footprint;
 mod material;
 pub mod outline;
+mod painter;
 mod sample;
 mod shade;
 pub mod shadow;
@@ -19,27 +20,7 @@ pub mod raster;
 #[allow(clippy::needless_range_loop)]
 pub mod ray;
 
-/// What makes pictures of scenes.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub enum Renderer {
-    /// Triangles to pixels: fast; neither shapes nor mirrors nor glass.
-    #[default]
-    Raster,
-    /// Rays alone.
-    Ray(ray::RaySettings),
-    /// With one sample a pixel, what is seen first is found by the rasterizer, all else by rays; rays alone with more.
-    Hybrid(ray::RaySettings),
-}
-
-impl Renderer {
-    /// How rays draw, if they do.
-    pub fn rays(&self) -> Option<&ray::RaySettings> {
-        match self {
-            Self::Raster => None,
-            Self::Ray(ray) | Self::Hybrid(ray) => Some(ray),
-        }
-    }
-}
+pub use painter::{Painter, Renderer, Watch};
 
 /// How a picture is made; what is on it is the [`Scene`](crate::scene::Scene).
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -165,7 +165,7 @@ pub(crate) fn blinn_phong(s: &Surface<F8>, ambient: Vec3, lights: &[Light]) -> V
     sum
 }
 
-/// The same in either precision, with the share of each lamp's light that arrives.
+/// The same in either precision, with the share of each lamp's light that arrives: all of it where nothing is said.
 #[inline(always)]
 pub(crate) fn shadowed<L: Lanes>(
     s: &Surface<L>,
@@ -175,9 +175,10 @@ pub(crate) fn shadowed<L: Lanes>(
     gated: bool,
 ) -> V3<L> {
     let mut sum = unlit(s, ambient);
-    for (lamp, &reached) in lamps.iter().zip(reached) {
+    for (i, lamp) in lamps.iter().enumerate() {
         let a = arrival(lamp, s.position);
-        sum = sum + a.intensity * (reflected(s, a.towards, gated) * reached);
+        let light = a.intensity * reflected(s, a.towards, gated);
+        sum = sum + reached.get(i).map_or(light, |&share| light * share);
     }
     sum
 }

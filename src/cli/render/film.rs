@@ -52,7 +52,7 @@ impl Job<'_> {
     /// Let a worker's next picture take its time and show how far it is.
     fn follow(&self, worker: &mut Worker) {
         let rays = self.shot.desc().renderer.rays();
-        worker.set_watch(rays.map(|_| renderer::watch(self.budget, self.bar.clone())));
+        worker.painter.watch = rays.map(|_| renderer::watch(self.budget, self.bar.clone()));
     }
 
     /// Draw a moment of a sheet, and count what it cost.

@@ -143,7 +143,7 @@ fn plan(args: &Args, task: &Task) -> Result<Plan, Failure> {
 fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -> Result<Written, Failure> {
     if let Some(Setting::Notes(scene)) = &task.import.setting {
         let written = shapes::draw(args, task, plan, scene, say)?;
-        job_done(args, &written, say);
+        say_samples(args, &written, 1, say);
         totals.add(&written, 1);
         return Ok(written);
     }
@@ -235,15 +235,15 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         job.bar.finish_and_clear();
         written?
     };
-    job_done(args, &written, say);
+    say_samples(args, &written, frames, say);
     totals.add(&written, frames);
     Ok(written)
 }
 
 /// Say how many samples pictures got that time ended.
-fn job_done(args: &Args, written: &Written, say: &Say) {
+fn say_samples(args: &Args, written: &Written, frames: usize, say: &Say) {
     let ended = args.renderer.budget.is_some() || say.verbose;
-    if let Some(samples) = renderer::reached(written.drawn.samples).filter(|_| ended) {
+    if let Some(samples) = renderer::reached(written.drawn.rays.samples, frames).filter(|_| ended) {
         say.note(&samples);
     }
 }

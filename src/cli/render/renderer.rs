@@ -1,10 +1,10 @@
 //! Options of how pictures are made: by the rasterizer or by rays, and how well.
 
 use crate::cli::Failure;
-use sinew::frames::{Look, Props, Watch};
+use sinew::frames::{Look, Props};
 use sinew::io::scene::ours::SceneFile;
-use sinew::render::Renderer;
 use sinew::render::ray::{Precision, RaySettings};
+use sinew::render::{Renderer, Watch};
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
@@ -94,7 +94,8 @@ impl RendererArgs {
     /// How rays draw a scene of the notes.
     pub fn of_notes(&self) -> Result<RaySettings, Failure> {
         match self.renderer {
-            None | Some(Kind::Ray) => Ok(self.rays(1, Precision::F64)),
+            // Nothing is too faint to be followed.
+            None | Some(Kind::Ray) => Ok(RaySettings { cutoff: 0.0, ..self.rays(1, Precision::F64) }),
             Some(_) => Err(Failure::Usage(
                 "--renderer: scenes of the notes are drawn by rays alone; expected ray, or leave it out"
                     .into(),
@@ -142,7 +143,7 @@ impl RendererArgs {
 }
 
 /// Follows a picture from now on: shows how far it is, and ends it when its time is up.
-pub fn watch(budget: Option<Duration>, bar: indicatif::ProgressBar) -> Box<Watch> {
+pub fn watch(budget: Option<Duration>, bar: indicatif::ProgressBar) -> Watch {
     let start = Instant::now();
     Box::new(move |p| {
         let gone = start.elapsed();
@@ -167,13 +168,10 @@ pub fn watch(budget: Option<Duration>, bar: indicatif::ProgressBar) -> Box<Watch
 }
 
 /// What to say of the samples that pictures got.
-pub fn reached([least, most]: [u32; 2]) -> Option<String> {
-    match (least, most) {
-        (_, 0) => None,
-        (1, 1) => Some("1 sample a pixel".into()),
-        _ if least == most => Some(format!("{most} samples a pixel")),
-        _ => Some(format!("{least} to {most} samples a pixel")),
-    }
+pub fn reached(samples: u32, frames: usize) -> Option<String> {
+    let least = if frames > 1 { "at least " } else { "" };
+    let s = if samples == 1 { "" } else { "s" };
+    (samples > 0).then(|| format!("{least}{samples} sample{s} a pixel"))
 }
 
 fn parse_error(text: &str) -> Result<f64, String> {

@@ -53,8 +53,7 @@ pub fn draw(
     let outcome = tracer.draw_shapes(scene, &settings, &ray, &mut *watch, &mut picture);
     bar.finish_and_clear();
     let mut written = Written::default();
-    written.drawn =
-        FrameStats { rays: outcome.count, samples: [outcome.samples; 2], ..FrameStats::default() };
+    written.drawn = FrameStats { rays: outcome, ..FrameStats::default() };
     let seen = match args.channels.names().is_empty() {
         true => Channels::default(),
         false => {

@@ -131,6 +131,11 @@ impl Rasterizer {
         self.window = window;
     }
 
+    /// What [`Rasterizer::set_window`] was told last.
+    pub fn window(&self) -> Option<Window> {
+        self.window
+    }
+
     /// Draw to 8-bit sRGB with straight alpha; `out` takes the size of `settings`.
     ///
     /// # Panics

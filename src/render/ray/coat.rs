@@ -80,10 +80,9 @@ impl<'a, R: Real> Coat<'a, R> {
 
     /// Surfaces at eight hits, and their alpha.
     pub fn dress(&self, isa: Isa, batch: &Batch) -> (Dressed<R>, [f64; 8]) {
-        let view = |k: usize| -batch.paths[k].direction.normalize_or(DVec3::NEG_Z);
         match self {
             Self::Scene(scene) => {
-                let (surface, alpha) = simd::run(isa, Dress { isa, scene, batch, view: gather(view) });
+                let (surface, alpha) = simd::run(isa, Dress { isa, scene, batch });
                 (Dressed::Scene(surface), alpha.0.map(f64::from))
             }
             Self::Plain { materials, .. } => {
@@ -91,7 +90,7 @@ impl<'a, R: Real> Coat<'a, R> {
                 for k in 0..8 {
                     s.position.set(k, V3::of(batch.spots[k].position));
                     s.normal.set(k, V3::of(batch.faced(k)));
-                    s.view.set(k, V3::of(view(k)));
+                    s.view.set(k, V3::of(batch.view(k)));
                 }
                 (Dressed::Plain(s), [1.0; 8])
             }
@@ -169,7 +168,34 @@ impl<R: Real> Dressed<R> {
     }
 }
 
-impl Batch<'_> {
+impl<'a> Batch<'a> {
+    /// Unit, towards where the ray came from.
+    fn view(&self, k: usize) -> DVec3 {
+        -self.paths[k].direction.normalize_or(DVec3::NEG_Z)
+    }
+
+    /// Eight points of an object's triangles.
+    #[inline(always)]
+    fn on_object(&self) -> Option<Varying<'a, false, Spread>> {
+        let object = self.body.and_then(|b| b.object)?;
+        let b = [0, 1, 2].map(|i| F8(self.spots.each_ref().map(|s| s.b[i] as f32)));
+        let moved = [0, 1].map(|axis| {
+            gather(|k| {
+                let s = &self.paths[k].spread;
+                s[axis].as_dvec3() + s[axis + 2].as_dvec3() * self.hits[k].t
+            })
+        });
+        let spread = Spread { direction: gather(|k| self.paths[k].direction), moved };
+        Some(varying(object, &self.hits.map(|h| h.triangle), b, gather(|k| self.view(k)), spread))
+    }
+
+    /// Eight points of a solid.
+    #[inline(always)]
+    fn on_solid(&self) -> Bare {
+        let (position, normal) = (gather(|k| self.spots[k].position), gather(|k| self.faced(k)));
+        Bare { position, normal, view: gather(|k| self.view(k)) }
+    }
+
     /// The geometric normal on the side that the ray comes from.
     pub fn faced(&self, k: usize) -> DVec3 {
         let n = self.spots[k].face;
@@ -181,11 +207,36 @@ fn gather(at: impl Fn(usize) -> DVec3) -> V8 {
     V8::gather(std::array::from_fn(|k| at(k).as_vec3()))
 }
 
+/// Shading normals and texture coordinates (of the first set) of a batch.
+pub(super) fn look(isa: Isa, scene: &Scene, batch: &Batch) -> (V8, [F8; 2]) {
+    simd::run(isa, Look { isa, scene, batch })
+}
+
+struct Look<'a> {
+    isa: Isa,
+    scene: &'a Scene<'a>,
+    batch: &'a Batch<'a>,
+}
+
+impl Kernel for Look<'_> {
+    type Output = (V8, [F8; 2]);
+
+    #[inline(always)]
+    fn run(self) -> (V8, [F8; 2]) {
+        let Self { isa, scene, batch } = self;
+        let m = material(scene, batch.material);
+        let tell = |normal: V8, uv: Uv| (normal, [uv.u, uv.v]);
+        match batch.on_object() {
+            Some(p) => tell(material::shading_normal(isa, scene, m, &p), p.uv(0)),
+            None => tell(material::shading_normal(isa, scene, m, &batch.on_solid()), Uv::ZERO),
+        }
+    }
+}
+
 struct Dress<'a> {
     isa: Isa,
     scene: &'a Scene<'a>,
     batch: &'a Batch<'a>,
-    view: V8,
 }
 
 impl Kernel for Dress<'_> {
@@ -193,26 +244,11 @@ impl Kernel for Dress<'_> {
 
     #[inline(always)]
     fn run(self) -> (Surface<F8>, F8) {
-        let Self { isa, scene, batch, view } = self;
+        let Self { isa, scene, batch } = self;
         let m = material(scene, batch.material);
-        match batch.body.and_then(|b| b.object) {
-            Some(object) => {
-                let ids = batch.hits.map(|h| h.triangle);
-                let b = [0, 1, 2].map(|i| F8(batch.spots.each_ref().map(|s| s.b[i] as f32)));
-                let direction = gather(|k| batch.paths[k].direction);
-                let moved = [0, 1].map(|axis| {
-                    gather(|k| {
-                        let s = &batch.paths[k].spread;
-                        s[axis].as_dvec3() + s[axis + 2].as_dvec3() * batch.hits[k].t
-                    })
-                });
-                let p = varying(object, &ids, b, view, Spread { direction, moved });
-                material::surface(isa, scene, m, &p)
-            }
-            None => {
-                let position = gather(|k| batch.spots[k].position);
-                material::surface(isa, scene, m, &Bare { position, normal: gather(|k| batch.faced(k)), view })
-            }
+        match batch.on_object() {
+            Some(p) => material::surface(isa, scene, m, &p),
+            None => material::surface(isa, scene, m, &batch.on_solid()),
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::math::lanes::{self, V3};
 use crate::math::simd::Isa;
 use crate::render::accel::{self, World};
 use crate::render::shade::{Lamp, LampKind};
-use crate::scene::{Geometry, Object, Scene, ShapeLight, ShapeMaterial, ShapeScene, Source};
+use crate::scene::{Geometry, Object, Scene, ShapeLight, ShapeMaterial, ShapeScene, Source, Style};
 use glam::{DVec3, Vec3};
 use std::cell::Cell;
 
@@ -59,7 +59,6 @@ pub(super) struct Stage<'a, R: Real> {
     pub lamps: Vec<Lamp<R>>,
     pub coat: Coat<'a, R>,
     pub background: [f32; 4],
-    pub sky: Option<[Vec3; 2]>,
 }
 
 /// What a ray meets. Objects beyond the bodies are solids.
@@ -179,7 +178,6 @@ impl<'a, R: Real> Stage<'a, R> {
             lamps: scene.lights.iter().map(Lamp::from).collect(),
             coat: Coat::Scene(scene),
             background: scene.background,
-            sky: scene.style.sky,
         }
     }
 
@@ -199,7 +197,25 @@ impl<'a, R: Real> Stage<'a, R> {
             lamps: scene.lights.iter().map(lamp_of).collect(),
             coat: Coat::plain(scene),
             background: [0.0, 0.0, 0.0, 1.0],
-            sky: None,
+        }
+    }
+
+    /// What a path shows that meets nothing: the background; mirrored or refracted, the sky if there is one; in a mirror, where all that
+    /// is nothing, the ambient light.
+    pub fn beyond(&self, path: &Path) -> (DVec3, f64) {
+        let [r, g, b, a] = self.background.map(f64::from);
+        let behind = DVec3::new(r, g, b);
+        match &self.coat {
+            Coat::Scene(Scene { style: Style { sky: Some([above, below]), .. }, .. }) if path.bounce > 0 => {
+                let up = path.direction.normalize_or(DVec3::Y).y as f32;
+                (below.lerp(*above, 0.5 + 0.5 * up).as_dvec3(), 1.0)
+            }
+            Coat::Scene(scene) if path.bounce > 0 && path.cover == 0.0 => {
+                let (above, up) = (scene.ambient.as_dvec3(), path.direction.normalize_or(DVec3::Y).y);
+                let below = scene.style.below.map_or(above, |b| b.as_dvec3());
+                (behind + below.lerp(above, 0.5 + 0.5 * up) * (1.0 - a), a)
+            }
+            _ => (behind, a),
         }
     }
 

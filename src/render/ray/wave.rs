@@ -83,18 +83,8 @@ impl Wave {
             match known(path).unwrap_or_else(|| stage.nearest(path, f64::INFINITY, true)) {
                 Some(hit) => self.hits.push((hit, i as u32)),
                 None => {
-                    let [r, g, b, a] = match stage.sky {
-                        Some([above, below]) if path.bounce > 0 => {
-                            let up = 0.5 + 0.5 * path.direction.normalize_or_zero().y as f32;
-                            below.lerp(above, up).extend(1.0).to_array().map(f64::from)
-                        }
-                        _ => stage.background.map(f64::from),
-                    };
-                    add(
-                        &mut self.sums[path.place as usize],
-                        path.weight * DVec3::new(r, g, b),
-                        path.cover * a,
-                    );
+                    let (light, alpha) = stage.beyond(path);
+                    add(&mut self.sums[path.place as usize], path.weight * light, path.cover * alpha);
                 }
             }
         }
@@ -117,14 +107,15 @@ impl Wave {
 
         // How much of each lamp arrives?
         self.reached.clear();
-        for lamp in 0..stage.lamps.len() {
-            let shadows = here.settings.shadows && dressed.takes_light();
-            let share = |k: usize, count: &mut RayCount| match shadows && k < run.len() {
-                true => arriving(stage, here, &batch, &dressed, lamp, k, count),
-                false => DVec3::ONE,
-            };
+        if here.settings.shadows && dressed.takes_light() {
             let count = &mut self.count;
-            self.reached.push(std::array::from_fn(|k| share(k, count)));
+            self.reached.extend((0..stage.lamps.len()).map(|lamp| {
+                let share = |k: usize, count: &mut RayCount| match k < run.len() {
+                    true => arriving(stage, here, &batch, &dressed, lamp, k, count),
+                    false => DVec3::ONE,
+                };
+                std::array::from_fn(|k| share(k, count))
+            }));
         }
         let colors = stage.coat.light(stage.isa, &dressed, &stage.lamps, &self.reached);
 
@@ -137,6 +128,7 @@ impl Wave {
             };
             // The inside of glass has no light of its own.
             let own = if finish.is_glass() && hit.back { DVec3::ZERO } else { colors[k] };
+            // What glass lets through shows what lies behind it, and be it nothing.
             let shown = if finish.is_glass() { 0.0 } else { alpha };
             add(&mut self.sums[path.place as usize], path.weight * own * alpha, path.cover * shown);
             let normal = match batch.body {
@@ -165,49 +157,42 @@ impl Wave {
             let (weight, cover) = (path.weight * (1.0 - alpha), path.cover * (1.0 - alpha));
             self.push(settings, Path { near, weight, cover, ..*path });
         }
-        if path.bounce >= settings.depth {
-            return;
+        let ends = path.bounce >= settings.depth;
+        if ends || !finish.is_glass() && finish.mirror.max_element() <= 0.0 {
+            let rest = if finish.is_glass() { path.cover * alpha } else { 0.0 };
+            return add(&mut self.sums[path.place as usize], DVec3::ZERO, rest);
         }
         let d = path.direction.normalize_or(DVec3::NEG_Z);
         let towards = |n: DVec3| if n.dot(d) > 0.0 { -n } else { n };
         let (n, face) = (towards(normal), towards(spot.face));
-        let gone = carried(path, hit.t, face);
-        let mut to = |direction: DVec3, bent: Option<DVec3>, weight: DVec3, cover: f64| {
-            let [x, y, dx, dy] = gone;
-            let turn = |v: Vec3| bent.map_or(v, |n| optics::mirrored(v.as_dvec3(), n).as_vec3());
-            self.push(
-                settings,
-                Path {
-                    bounce: path.bounce + 1,
-                    origin: spot.leave(direction),
-                    direction,
-                    near: 0.0,
-                    weight,
-                    cover,
-                    left: hit.object,
-                    spread: [x, y, turn(dx), turn(dy)],
-                    ..*path
-                },
-            );
+        let [x, y, dx, dy] = carried(path, hit.t, face);
+        let on = |direction: DVec3, spread: [Vec3; 2], weight: DVec3, cover: f64| Path {
+            bounce: path.bounce + 1,
+            origin: spot.leave(direction),
+            direction,
+            near: 0.0,
+            weight: path.weight * weight * alpha,
+            cover,
+            left: hit.object,
+            spread: [x, y, spread[0], spread[1]],
+            ..*path
         };
         // A mirror that is bent by normals must not throw light through itself.
-        let up = |r: DVec3| if r.dot(face) > 0.0 { r } else { optics::mirrored(d, face) };
+        let level = optics::mirrored(d, n);
+        let mirrored = if level.dot(face) > 0.0 { level } else { optics::mirrored(d, face) };
+        let turned = [dx, dy].map(|v| optics::mirrored(v.as_dvec3(), face).as_vec3());
         if finish.mirror.max_element() > 0.0 {
-            to(up(optics::mirrored(d, n)), Some(face), path.weight * finish.mirror * alpha, 0.0);
+            self.push(settings, on(mirrored, turned, finish.mirror, 0.0));
         }
         if finish.is_glass() {
-            let ratio = if hit.back { finish.ior } else { 1.0 / finish.ior };
-            let bent = optics::refracted(d, n, ratio);
+            let bent = optics::refracted(d, n, if hit.back { finish.ior } else { 1.0 / finish.ior });
+            let bent = bent.filter(|b| b.0.dot(face) < 0.0);
             let share = bent.map_or(1.0, |b| b.1);
-            to(
-                up(optics::mirrored(d, n)),
-                Some(face),
-                path.weight * share * alpha,
-                path.cover * share * alpha,
-            );
-            if let Some((t, share)) = bent.filter(|b| b.0.dot(face) < 0.0) {
-                let weight = path.weight * finish.transmission * ((1.0 - share) * alpha);
-                to(t, None, weight, path.cover * (1.0 - share) * alpha);
+            add(&mut self.sums[path.place as usize], DVec3::ZERO, path.cover * share * alpha);
+            self.push(settings, on(mirrored, turned, DVec3::splat(share), 0.0));
+            if let Some((t, share)) = bent {
+                let cover = path.cover * (1.0 - share) * alpha;
+                self.push(settings, on(t, [dx, dy], finish.transmission * (1.0 - share), cover));
             }
         }
     }
