@@ -23,6 +23,8 @@ mod raster;
 #[path = "../src/test_rng.rs"]
 mod rng;
 #[cfg(feature = "cli")]
+mod scenes;
+#[cfg(feature = "cli")]
 mod sheet;
 #[cfg(all(feature = "io", feature = "pictures"))]
 mod shots;

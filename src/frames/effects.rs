@@ -8,7 +8,7 @@ use crate::render::backdrop::{Backdrop, Ground};
 use crate::render::footprint::Footprint;
 use crate::render::raster::{IdImage, Stats};
 use crate::render::shadow::{ShadowDesc, ShadowMaker};
-use crate::render::{Painter, Settings};
+use crate::render::{Painter, Renderer, Settings};
 use crate::scene::{AlphaMode, Camera, LightKind, Material, Projection, Scene, ShadowMap};
 use glam::Vec3;
 
@@ -78,7 +78,7 @@ impl Stage {
         let mut stats = self.shadows(look, settings, &caster, effects);
         let mut scene = Scene { background: [0.0; 4], ..scene.clone() };
         let Effects { key, fine, ids, .. } = effects;
-        if look.shadows == Shadows::Map && key.size > 0 {
+        if look.shadows == Shadows::Map && key.size > 0 && desc.renderer == Renderer::Raster {
             scene.style.shadow = Some(key);
         }
 

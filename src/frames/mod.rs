@@ -168,7 +168,11 @@ impl std::ops::AddAssign for FrameStats {
         self.bones += o.bones;
         self.vertices += o.vertices;
         self.raster += o.raster;
-        self.rays.samples = o.rays.samples;
+        // The fewest of any picture.
+        self.rays.samples = match self.rays.samples {
+            0 => o.rays.samples,
+            n => n.min(o.rays.samples.max(1)),
+        };
         self.rays.count += o.rays.count;
         self.times.pose += o.times.pose;
         self.times.deform += o.times.deform;
@@ -235,10 +239,13 @@ impl<'a> Shot<'a> {
         ground_point(self.asset, self.desc.clip)
     }
 
-    /// Names of the objects that pixels may show, in order: those of the meshes that the character's instances wear.
+    /// Names of the objects that pixels may show, in order: those of the meshes that the character's instances wear, and, where rays
+    /// draw, shapes.
     pub fn object_names(&self) -> Vec<String> {
         let character = &self.asset.character;
-        character.instances().iter().map(|i| character.mesh(i).name.clone()).collect()
+        let meshes = character.instances().iter().map(|i| character.mesh(i).name.clone());
+        let shapes = if self.desc.renderer == Renderer::Raster { 0 } else { self.shapes.len() };
+        meshes.chain((1..=shapes).map(|i| format!("shape {i}"))).collect()
     }
 
     /// Pixels a row, and rows, of its pictures.

@@ -109,7 +109,17 @@ fn text(bytes: &[u8]) -> Result<Triangles, StlError> {
         words.expect(&["endloop", "endfacet"], "`endloop` and `endfacet` after three corners")?;
         triangles.push(triangle);
     }
-    Ok(triangles)
+    // Binary files may begin like text: their beginnings are none.
+    let last = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty()).last();
+    match last {
+        Some((_, l)) if l.trim_start().get(..8).is_some_and(|w| w.eq_ignore_ascii_case("endsolid")) => {
+            Ok(triangles)
+        }
+        last => {
+            words.line = last.map_or(1, |(i, _)| i + 1);
+            words.wrong("`endsolid` on a line of its own at the end", last.map(|(_, l)| l.trim()))
+        }
+    }
 }
 
 struct Words<'a, 'i> {

@@ -75,7 +75,7 @@ impl<'a> Batch<'a> {
             clip: "clip",
             index: 0,
         }))?;
-        args.sheet.settings(args.output.settings(None)?)?;
+        args.sheet.settings(args.output.settings(None, args.renderer.coverage())?)?;
         if args.inputs.len() > 1 && !template.tells_inputs() {
             let message = "-o: several inputs need {name} (or {folder}) in the output's name";
             return Err(Failure::Usage(message.into()));

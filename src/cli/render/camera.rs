@@ -29,7 +29,7 @@ pub struct CameraArgs {
     camera: String,
     /// Stand here, in world metres; --camera then gives fov, focal, ortho or roll alone.
     #[arg(long, value_name = "X,Y,Z", requires = "look_at", allow_hyphen_values = true, value_parser = parse_point)]
-    eye: Option<DVec3>,
+    pub eye: Option<DVec3>,
     /// Look here, in world metres.
     #[arg(long, value_name = "X,Y,Z", requires = "eye", allow_hyphen_values = true, value_parser = parse_point)]
     look_at: Option<DVec3>,

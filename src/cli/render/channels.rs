@@ -1,7 +1,7 @@
 //! Channels beside a picture: files of their own beside PNG and WebP, layers within OpenEXR.
 
 use crate::cli::Failure;
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use sinew::frames::{Extent, Shot, Worker};
 use sinew::io::picture::{Data, Error, Format, PngLevel, Target, encode_data_png};
 use sinew::render::channel::{Channel, Channels};
@@ -101,6 +101,19 @@ impl Beside {
         Self { names, level, extent, objects: shot.object_names(), bones }
     }
 
+    /// Of one picture whose ranges are its own.
+    pub fn of_picture(args: &ChannelArgs, seen: &Channels, objects: Vec<String>, level: PngLevel) -> Self {
+        let mut extent =
+            Extent { bounds: [DVec3::INFINITY, DVec3::NEG_INFINITY], depth: [f32::INFINITY, 0.0] };
+        for i in (0..seen.objects.len()).filter(|&i| seen.objects[i] > 0) {
+            let ([low, high], [near, far]) = (&mut extent.bounds, &mut extent.depth);
+            let p = seen.positions[i].as_dvec3();
+            (*low, *high) = (low.min(p), high.max(p));
+            (*near, *far) = (near.min(seen.depth[i]), far.max(seen.depth[i]));
+        }
+        Self { names: args.names(), level, extent, objects, bones: Vec::new() }
+    }
+
     pub fn wanted(&self) -> Vec<Channel> {
         self.names.iter().map(|n| n.0).collect()
     }
@@ -191,7 +204,7 @@ impl Beside {
                 )
             }
             _ => {
-                let span = (high - low).max(glam::DVec3::splat(1e-30));
+                let span = (high - low).max(DVec3::splat(1e-30));
                 let pixel = |i: usize| ((seen.positions[i].as_dvec3() - low) / span).as_vec3();
                 wide(&pixel, &format!("position: 0 is {low} m, 65535 is {high} m, world space"))
             }

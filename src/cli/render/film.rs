@@ -1,6 +1,7 @@
 //! Frames into files: drawn and encoded by workers, written in order.
 
 use super::channels::Beside;
+use super::renderer;
 use super::sheet::Painter;
 use super::time::Frame;
 use crate::cli::{Failure, say::Say};
@@ -35,6 +36,10 @@ pub struct Job<'a> {
     pub hash: bool,
     /// What is written beside each picture.
     pub beside: Beside,
+    /// How long rays may draw a picture.
+    pub budget: Option<Duration>,
+    /// Shows how far one picture is.
+    pub bar: indicatif::ProgressBar,
     /// Frames become pixel art; they are drawn before nothing then.
     pub art: Option<Painter>,
     /// Pixels of a finished frame for each one that is drawn, across and down.
@@ -44,9 +49,16 @@ pub struct Job<'a> {
 }
 
 impl Job<'_> {
+    /// Let a worker's next picture take its time and show how far it is.
+    fn follow(&self, worker: &mut Worker) {
+        let rays = self.shot.desc().renderer.rays();
+        worker.painter.watch = rays.map(|_| renderer::watch(self.budget, self.bar.clone()));
+    }
+
     /// Draw a moment of a sheet, and count what it cost.
     pub fn draw(&self, moment: Moment, worker: &mut Worker) -> Rgba8 {
         let mut picture = Rgba8::default();
+        self.follow(worker);
         let stats = self.shot.draw(moment, worker, &mut picture);
         self.count(stats);
         picture
@@ -159,6 +171,7 @@ type Shoot<P> = fn(&Job, Moment, &mut Worker) -> (P, FrameStats);
 /// As it is shown: painted, where there is pixel art.
 fn shoot(job: &Job, moment: Moment, worker: &mut Worker) -> (Rgba8, FrameStats) {
     let mut out = Rgba8::default();
+    job.follow(worker);
     let stats = job.shot.draw(moment, worker, &mut out);
     match &job.art {
         Some(art) => (art.paint(&out), stats),
@@ -168,6 +181,7 @@ fn shoot(job: &Job, moment: Moment, worker: &mut Worker) -> (Rgba8, FrameStats) 
 
 fn shoot_linear(job: &Job, moment: Moment, worker: &mut Worker) -> (Image, FrameStats) {
     let mut out = Image::default();
+    job.follow(worker);
     let stats = job.shot.draw_linear(moment, worker, &mut out);
     (out, stats)
 }

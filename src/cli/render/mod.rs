@@ -8,6 +8,8 @@ mod film;
 mod look;
 mod output;
 mod overlay;
+mod renderer;
+mod shapes;
 mod sheet;
 mod stats;
 mod time;
@@ -20,7 +22,7 @@ use sinew::frames::{Look, Props, Shot, ShotDesc};
 use sinew::io::Import;
 use sinew::io::picture::{Format, Target};
 use sinew::io::scene::{Setting, ours::SceneFile};
-use sinew::render::Settings;
+use sinew::render::{Renderer, Settings};
 use sinew::time::Range;
 use stats::Totals;
 use std::path::{Path, PathBuf};
@@ -67,6 +69,8 @@ pub struct Args {
     #[command(flatten)]
     overlay: overlay::OverlayArgs,
     #[command(flatten)]
+    renderer: renderer::RendererArgs,
+    #[command(flatten)]
     channels: channels::ChannelArgs,
     #[command(flatten)]
     sheet: sheet::SheetArgs,
@@ -103,6 +107,15 @@ fn props(scene: &SceneFile) -> Props {
     Props { shapes: scene.shapes.clone(), materials: scene.materials.clone() }
 }
 
+/// Pixels of a picture where no option says.
+fn usual_size(import: &Import) -> Option<[usize; 2]> {
+    match &import.setting {
+        Some(Setting::Ours(scene)) => scene.size,
+        Some(Setting::Notes(scene)) => Some(shapes::usual_size(scene)),
+        None => None,
+    }
+}
+
 /// Which pictures an output consists of.
 struct Plan {
     frames: Vec<Frame>,
@@ -121,18 +134,25 @@ fn plan(args: &Args, task: &Task) -> Result<Plan, Failure> {
     if !one_picture {
         task.target.check_frames(frames.len()).map_err(|e| Failure::Usage(e.to_string()))?;
     }
-    let settings = args.output.settings(scene(task.import).and_then(|s| s.size))?;
+    let settings = args.output.settings(usual_size(task.import), args.renderer.coverage())?;
     let whole = [settings.width, settings.height];
     Ok(Plan { frames, size: args.camera.crop(whole)?.map_or(whole, |c| [c.width, c.height]) })
 }
 
 /// Draw the frames of a plan and write them.
 fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -> Result<Written, Failure> {
+    if let Some(Setting::Notes(scene)) = &task.import.setting {
+        let written = shapes::draw(args, task, plan, scene, say)?;
+        say_samples(args, &written, 1, say);
+        totals.add(&written, 1);
+        return Ok(written);
+    }
     let (asset, scene) = (&task.import.asset, scene(task.import));
     let character = &asset.character;
     let overlays = args.overlay.overlays(asset, args.time.fps)?;
     let bare = character.instances().iter().all(|i| character.mesh(i).triangles.is_empty());
-    if bare && overlays.is_empty() {
+    let props = scene.map(props).unwrap_or_default();
+    if bare && overlays.is_empty() && props.shapes.is_empty() {
         say.warn(&format!("{}: there are no triangles; the picture will be empty", task.input.display()));
     }
 
@@ -151,15 +171,26 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
     let threads = args.output.threads();
     let one_picture = args.sheet.is_one_picture();
     let alone = plan.frames.len() == 1 && !one_picture;
-    let settings = args.sheet.settings(args.output.settings(scene.and_then(|s| s.size))?)?;
+    let settings =
+        args.sheet.settings(args.output.settings(usual_size(task.import), args.renderer.coverage())?)?;
     let settings = Settings { threads: if alone { threads } else { 1 }, ..settings };
+    let look = args.look.look(asset, scene.map(|s| &s.look), |m| say.warn(m))?;
+    let renderer =
+        args.renderer.renderer(&look, &props, scene, args.sheet.pixels.is_on(), args.look.has_shadows())?;
+    if renderer == Renderer::Raster && !props.shapes.is_empty() {
+        say.warn(&format!(
+            "the rasterizer leaves {} shapes out; --renderer ray draws them",
+            props.shapes.len()
+        ));
+    }
     let desc = ShotDesc {
+        renderer,
         clip: task.clip,
         wrap: args.time.wrap(args.camera.turntable),
         view: args.sheet.view(args.camera.view(asset, scene)?, args.camera.is_default()),
         framing: args.camera.framing(asset)?,
-        look: args.look.look(asset, scene.map(|s| &s.look), |m| say.warn(m))?,
-        props: scene.map(props).unwrap_or_default(),
+        look,
+        props,
         overlays,
         crop: args.camera.crop([settings.width, settings.height])?,
         settings,
@@ -187,6 +218,8 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         force: args.output.force || (one_picture && args.batch.skip_existing),
         hash: args.batch.manifest.is_some(),
         beside,
+        budget: args.renderer.budget,
+        bar: if alone { say.picture_progress() } else { indicatif::ProgressBar::hidden() },
         art: None,
         cost: Default::default(),
         scale: args.sheet.pixels.scale(),
@@ -198,10 +231,21 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         args.sheet.write(&job, name, say)?;
         job.cost.into_inner().unwrap_or_else(|e| e.into_inner())
     } else {
-        film::write(&job, say)?
+        let written = film::write(&job, say);
+        job.bar.finish_and_clear();
+        written?
     };
+    say_samples(args, &written, frames, say);
     totals.add(&written, frames);
     Ok(written)
+}
+
+/// Say how many samples pictures got that time ended.
+fn say_samples(args: &Args, written: &Written, frames: usize, say: &Say) {
+    let ended = args.renderer.budget.is_some() || say.verbose;
+    if let Some(samples) = renderer::reached(written.drawn.rays.samples, frames).filter(|_| ended) {
+        say.note(&samples);
+    }
 }
 
 /// Options that the format has no place for are not dropped in silence.

@@ -8,7 +8,7 @@ use crate::math::lanes::{self, V3};
 use crate::math::simd::Isa;
 use crate::render::accel::{self, World};
 use crate::render::shade::{Lamp, LampKind};
-use crate::scene::{Geometry, Object, Scene, ShapeLight, ShapeMaterial, ShapeScene, Source};
+use crate::scene::{Geometry, Object, Scene, ShapeLight, ShapeMaterial, ShapeScene, Source, Style};
 use glam::{DVec3, Vec3};
 use std::cell::Cell;
 
@@ -200,11 +200,16 @@ impl<'a, R: Real> Stage<'a, R> {
         }
     }
 
-    /// What a path shows that meets nothing: the background, and in a mirror, where that is nothing, the ambient light.
+    /// What a path shows that meets nothing: the background; mirrored or refracted, the sky if there is one; in a mirror, where all that
+    /// is nothing, the ambient light.
     pub fn beyond(&self, path: &Path) -> (DVec3, f64) {
         let [r, g, b, a] = self.background.map(f64::from);
         let behind = DVec3::new(r, g, b);
         match &self.coat {
+            Coat::Scene(Scene { style: Style { sky: Some([above, below]), .. }, .. }) if path.bounce > 0 => {
+                let up = path.direction.normalize_or(DVec3::Y).y as f32;
+                (below.lerp(*above, 0.5 + 0.5 * up).as_dvec3(), 1.0)
+            }
             Coat::Scene(scene) if path.bounce > 0 && path.cover == 0.0 => {
                 let (above, up) = (scene.ambient.as_dvec3(), path.direction.normalize_or(DVec3::Y).y);
                 let below = scene.style.below.map_or(above, |b| b.as_dvec3());
