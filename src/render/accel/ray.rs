@@ -56,6 +56,8 @@ mod sealed {
 
     /// What differs between the two.
     pub trait Sealed: Sized {
+        /// Without its sign.
+        fn abs(self) -> Self;
         /// Rounded to nearest.
         fn from_f64(x: f64) -> Self;
         /// `a·b − c·d`, with the sign of the exact value and a relative error of at most 2⁻⁵².
@@ -92,6 +94,10 @@ impl Real for f32 {
 
 impl Sealed for f32 {
     #[inline(always)]
+    fn abs(self) -> Self {
+        f32::abs(self)
+    }
+    #[inline(always)]
     fn from_f64(x: f64) -> Self {
         x as f32
     }
@@ -111,6 +117,10 @@ impl Real for f64 {
 }
 
 impl Sealed for f64 {
+    #[inline(always)]
+    fn abs(self) -> Self {
+        f64::abs(self)
+    }
     #[inline(always)]
     fn from_f64(x: f64) -> Self {
         x

@@ -22,16 +22,20 @@ pub struct Shear<R> {
     pub t_max: R,
 }
 
+/// The axis after an axis, round and round.
+const NEXT: [usize; 4] = [1, 2, 0, 1];
+
 impl<R: Real> Shear<R> {
     #[inline(always)]
     pub fn new(ray: &Ray<R>) -> Self {
-        let d = ray.direction;
-        let along = |k: usize| Into::<f64>::into(d[k]).abs();
-        let size = [along(0), along(1), along(2)];
-        let z = if size[0] > size[1] && size[0] > size[2] { 0 } else { 1 + (size[1] <= size[2]) as usize };
-        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
+        let d = &ray.direction;
+        // Without branches: the longest axis of a stray ray cannot be predicted.
+        let (x, y, z) = (d[0].abs(), d[1].abs(), d[2].abs());
+        let (last, middle) = ((z >= x && z >= y) as usize, (y > x) as usize);
+        let z = 2 * last + (1 - last) * middle;
         // A reflected frame would turn the winding round.
-        let axes = if Into::<f64>::into(d[z]) < 0.0 { [y, x, z] } else { [x, y, z] };
+        let swap = (d[z] < R::from(0.0)) as usize;
+        let axes = [NEXT[z + swap], NEXT[z + 1 - swap], z];
         Self {
             origin: ray.origin,
             axes,
