@@ -32,7 +32,7 @@ use lanes::{Lanes, Machine, Work};
 use ray::Slab;
 use search::{Any, Nearest, Packs, Search};
 use tree::{Node, Visitor};
-use triangle::{EMPTY, Pack, Shear, standing};
+use triangle::{EMPTY, Pack, standing};
 
 /// How triangles are found. The answers are the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -187,7 +187,7 @@ impl Accel {
     fn search<S: Lanes, R: Real>(&self, ray: &Ray<R>, object: u32, t_max: f32, search: &mut impl Search<R>) {
         let Some(mut slab) = Slab::new(ray, &self.span, 1.0) else { return };
         slab.t_max = slab.t_max.min(t_max);
-        let mut packs = Packs { packs: &self.packs, shear: Shear::new(ray), object, search };
+        let mut packs = Packs { packs: &self.packs, ray, shear: None, object, search };
         match self.kind {
             Kind::Tree => tree::walk::<S>(&self.nodes, &slab, &mut packs),
             Kind::Brute => {

@@ -171,9 +171,9 @@ impl Slab {
         let (o, d) = (three(&ray.origin), three(&ray.direction));
         let (size, away) = (d.abs(), o.abs());
         let longest = size.max_element();
-        let near = size.max(away).cmple(Vec3A::splat(REACH)).all() && !(d + o).is_nan();
+        let near = (size.cmple(Vec3A::splat(REACH)) & away.cmple(Vec3A::splat(REACH))).all();
         let (t_min, t_max) = (round(ray.t_min), round(ray.t_max));
-        if !(near && longest >= 1.0 / REACH && t_min.is_finite() && t_max >= t_min) {
+        if !(near & (longest >= 1.0 / REACH) & (t_min.abs() < f32::INFINITY) & (t_max >= t_min)) {
             return None;
         }
         let reach = (o - Vec3A::from(span.lo)).abs().max((Vec3A::from(span.hi) - o).abs()).max_element();
