@@ -12,12 +12,14 @@ use glam::Vec3A;
 use std::mem::MaybeUninit;
 
 /// Nodes above one another at most; builders halve what is left before they run out.
-pub(super) const DEPTH: usize = 16;
+pub(super) const DEPTH: usize = 54;
+
+const STACK: usize = 7 * DEPTH + 1 + 8;
 
 /// What a walk has put aside: seven siblings a level, and room to write eight at once.
 pub struct Stack {
-    t: [MaybeUninit<f32>; 128],
-    at: [MaybeUninit<u32>; 128],
+    t: [MaybeUninit<f32>; STACK],
+    at: [MaybeUninit<u32>; STACK],
     top: usize,
 }
 
@@ -26,7 +28,11 @@ pub struct Stack {
 impl Stack {
     #[inline(always)]
     pub fn new() -> Self {
-        Self { t: [const { MaybeUninit::uninit() }; 128], at: [const { MaybeUninit::uninit() }; 128], top: 0 }
+        Self {
+            t: [const { MaybeUninit::uninit() }; STACK],
+            at: [const { MaybeUninit::uninit() }; STACK],
+            top: 0,
+        }
     }
 
     #[inline(always)]
@@ -60,8 +66,6 @@ impl Stack {
         Some(item)
     }
 }
-
-const _: () = assert!(7 * DEPTH + 1 + 8 <= 128);
 
 /// A way to do eight things at a time.
 pub trait Lanes: Copy {
