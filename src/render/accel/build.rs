@@ -2,47 +2,72 @@
 
 use super::lanes::DEPTH;
 use super::tree::{LEAF, Node};
-use glam::Vec3;
+use glam::{Vec3, Vec3A, Vec4};
 
 /// Triangles in a leaf at most.
 pub(super) const LEAF_SIZE: usize = 4;
 
 const BINS: usize = 16;
 
+/// Set in the bits of an id, so that it is no denormal number: those would halve the speed.
+const TAG: u32 = 1 << 30;
+
 /// A box and what it holds.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Item {
-    pub lo: Vec3,
-    pub id: u32,
-    pub hi: Vec3,
+    /// The low corner; the bits of the last component are who it is.
+    lo: Vec4,
+    hi: Vec4,
 }
 
 impl Item {
-    fn centre(&self) -> Vec3 {
-        self.lo + self.hi
+    pub fn new(lo: Vec3A, hi: Vec3A, id: u32) -> Self {
+        Self { lo: lo.extend(f32::from_bits(id | TAG)), hi: hi.extend(0.0) }
+    }
+
+    #[inline(always)]
+    fn id(&self) -> u32 {
+        self.lo.w.to_bits() ^ TAG
+    }
+
+    #[inline(always)]
+    pub fn span(&self) -> Span {
+        Span { lo: Vec3A::from_vec4(self.lo), hi: Vec3A::from_vec4(self.hi) }
     }
 }
 
 /// A growing box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Span {
-    pub lo: Vec3,
-    pub hi: Vec3,
+    pub lo: Vec3A,
+    pub hi: Vec3A,
 }
 
 impl Span {
-    pub const EMPTY: Self = Self { lo: Vec3::INFINITY, hi: Vec3::NEG_INFINITY };
+    pub const EMPTY: Self = Self { lo: Vec3A::INFINITY, hi: Vec3A::NEG_INFINITY };
 
     #[inline(always)]
-    pub fn add(&mut self, lo: Vec3, hi: Vec3) {
-        self.lo = self.lo.min(lo);
-        self.hi = self.hi.max(hi);
+    pub fn join(&mut self, other: Self) {
+        self.lo = self.lo.min(other.lo);
+        self.hi = self.hi.max(other.hi);
+    }
+
+    /// Twice the centre.
+    #[inline(always)]
+    fn centre(&self) -> Vec3A {
+        self.lo + self.hi
     }
 
     /// Half its surface; 0 when empty.
+    #[inline(always)]
     pub fn area(&self) -> f32 {
-        let d = (self.hi - self.lo).max(Vec3::ZERO);
+        let d = (self.hi - self.lo).max(Vec3A::ZERO);
         d.x * d.y + d.y * d.z + d.z * d.x
+    }
+
+    /// Its two corners.
+    pub fn corners(&self) -> (Vec3, Vec3) {
+        (self.lo.into(), self.hi.into())
     }
 }
 
@@ -59,8 +84,9 @@ impl Range {
     fn new(items: &[Item], start: usize, end: usize) -> Self {
         let (mut span, mut centres) = (Span::EMPTY, Span::EMPTY);
         for i in &items[start..end] {
-            span.add(i.lo, i.hi);
-            centres.add(i.centre(), i.centre());
+            let own = i.span();
+            span.join(own);
+            centres.join(Span { lo: own.centre(), hi: own.centre() });
         }
         Self { start, end, span, centres }
     }
@@ -239,7 +265,7 @@ impl Wide<'_> {
         if count > 0 {
             let mut ids = [u32::MAX; LEAF_SIZE];
             let own = &self.items[start as usize..][..count as usize];
-            ids.iter_mut().zip(own).for_each(|(id, item)| *id = item.id);
+            ids.iter_mut().zip(own).for_each(|(id, item)| *id = item.id());
             ids[..count as usize].sort_unstable();
             self.grown.leaves.push(ids);
             return LEAF | (self.grown.leaves.len() - 1) as u32;
@@ -263,8 +289,7 @@ impl Wide<'_> {
     fn open(&mut self, at: u32) -> usize {
         let mut node = Node::EMPTY;
         for (lane, child) in self.children(at).into_iter().enumerate() {
-            let span = self.forks[child as usize].span;
-            node.set(lane, (span.lo, span.hi));
+            node.set(lane, self.forks[child as usize].span);
         }
         node.sort();
         self.grown.nodes.push(node);
@@ -288,15 +313,15 @@ impl Plane {
 /// How centres fall into bins.
 #[derive(Clone, Copy)]
 struct Bins {
-    low: Vec3,
-    scale: Vec3,
+    low: Vec3A,
+    scale: Vec3A,
     count: usize,
 }
 
 impl Bins {
     #[inline(always)]
     fn of(&self, item: &Item) -> [usize; 3] {
-        let b = (item.centre() - self.low) * self.scale;
+        let b = (item.span().centre() - self.low) * self.scale;
         // Casts saturate, and a width of nothing has scale 0.
         [b.x, b.y, b.z].map(|x| (x as usize).min(self.count - 1))
     }
@@ -308,12 +333,13 @@ fn cheapest(items: &[Item], r: &Range, leaf: usize) -> Option<Plane> {
     let scale =
         |w: f32| if w > 0.0 && w.is_finite() { (count as f32 * 0.9999 / w).min(f32::MAX) } else { 0.0 };
     let bins =
-        Bins { low: r.centres.lo, scale: Vec3::new(scale(width.x), scale(width.y), scale(width.z)), count };
+        Bins { low: r.centres.lo, scale: Vec3A::new(scale(width.x), scale(width.y), scale(width.z)), count };
     let mut spans = [[Span::EMPTY; BINS]; 3];
     let mut counts = [[0usize; BINS]; 3];
     for item in items {
+        let own = item.span();
         for (axis, b) in bins.of(item).into_iter().enumerate() {
-            spans[axis][b].add(item.lo, item.hi);
+            spans[axis][b].join(own);
             counts[axis][b] += 1;
         }
     }
@@ -323,13 +349,13 @@ fn cheapest(items: &[Item], r: &Range, leaf: usize) -> Option<Plane> {
         let (mut right, mut n) = ([(0.0, 0); BINS], 0);
         let mut span = Span::EMPTY;
         for b in (1..count).rev() {
-            span.add(spans[axis][b].lo, spans[axis][b].hi);
+            span.join(spans[axis][b]);
             n += counts[axis][b];
             right[b] = (span.area() * packs(n), n);
         }
         (span, n) = (Span::EMPTY, 0);
         for b in 0..count - 1 {
-            span.add(spans[axis][b].lo, spans[axis][b].hi);
+            span.join(spans[axis][b]);
             n += counts[axis][b];
             let cost = span.area() * packs(n) + right[b + 1].0;
             if n > 0 && right[b + 1].1 > 0 && best.is_none_or(|(c, ..)| cost < c) {

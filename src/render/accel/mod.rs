@@ -49,7 +49,7 @@ const DECAY: f64 = 1.3;
 
 /// The triangles of one surface, ready for rays in the frame of its positions.
 ///
-/// Vertices that are not finite, or beyond 2⁴⁰, are taken to stand at the origin.
+/// Coordinates that are not finite, or beyond 2⁴⁰, are taken for 0.
 #[derive(Clone, Debug)]
 pub struct Accel {
     kind: Kind,
@@ -92,18 +92,18 @@ impl Accel {
 
     /// Corner of the box with the smallest coordinates, and with the largest; `None` without triangles.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
-        (!self.triangles.is_empty()).then_some((self.span.lo, self.span.hi))
+        (!self.triangles.is_empty()).then_some(self.span.corners())
     }
 
     fn build(&mut self, positions: &[Vec3], threads: usize) {
         let corner = |&i: &u32| standing(positions[i as usize]);
         let item = |(id, t): (usize, &[u32; 3])| {
             let [a, b, c] = t.each_ref().map(corner);
-            Item { lo: a.min(b).min(c), hi: a.max(b).max(c), id: id as u32 }
+            Item::new(a.min(b).min(c), a.max(b).max(c), id as u32)
         };
         let mut items: Vec<Item> = self.triangles.iter().enumerate().map(item).collect();
         self.span = Span::EMPTY;
-        items.iter().for_each(|i| self.span.add(i.lo, i.hi));
+        items.iter().for_each(|i| self.span.join(i.span()));
         let leaves = match self.kind {
             Kind::Tree => {
                 let grown = build::grow(&mut items, build::LEAF_SIZE, threads);
@@ -116,8 +116,10 @@ impl Accel {
                 ids.chunks(4).map(four).collect()
             }
         };
-        let triangles = &self.triangles;
-        self.packs = leaves.iter().map(|&ids| Pack::new(positions, triangles, ids)).collect();
+        self.packs = leaves.into_iter().map(Pack::new).collect();
+        each(self.packs.chunks_mut(1 << 14).collect(), threads, |packs| {
+            packs.iter_mut().for_each(|p| _ = p.fill(positions, &self.triangles));
+        });
         self.built = self.cost();
     }
 
@@ -141,33 +143,27 @@ impl Accel {
     }
 
     fn refit(&mut self, positions: &[Vec3], threads: usize) {
-        // Cut nodes and leaves where the children of the root end.
         let triangles = &self.triangles;
+        let fill = |p: &mut Pack| p.fill(positions, triangles);
+        self.span = Span::EMPTY;
         let Some((root, mut nodes)) = self.nodes.split_first_mut() else {
-            self.packs.iter_mut().for_each(|p| p.fill(positions, triangles));
-            self.span = Span::EMPTY;
-            self.packs.iter().for_each(|p| self.span.add(p.bounds().0, p.bounds().1));
-            return;
+            return self.packs.iter_mut().for_each(|p| self.span.join(fill(p)));
         };
-        let mut packs = &mut self.packs[..];
-        let mut from = [1, 0];
-        let mut parts = Vec::new();
-        for (lane, &to) in self.cuts.iter().enumerate() {
+        // Cut nodes and leaves where the children of the root end; fit each part from its leaves up, then the root.
+        let (mut packs, mut from, mut parts) = (&mut self.packs[..], [1, 0], Vec::new());
+        for (&child, &to) in root.children.iter().zip(&self.cuts) {
             let (own_nodes, rest) = nodes.split_at_mut(to[0] - from[0]);
             let (own_packs, others) = packs.split_at_mut(to[1] - from[1]);
-            parts.push((lane, from, own_nodes, own_packs, Span::EMPTY));
+            parts.push((child, own_nodes, own_packs, from, Span::EMPTY));
             (nodes, packs, from) = (rest, others, to);
         }
-
-        // Fit each part from its leaves up, then the root.
-        each(parts.iter_mut().collect(), threads, |(_, from, nodes, packs, span)| {
-            (span.lo, span.hi) = tree::refit(nodes, packs, *from, |p| {
-                p.fill(positions, triangles);
-                p.bounds()
-            });
+        each(parts.iter_mut().collect(), threads, |(child, nodes, packs, from, span)| {
+            *span = tree::refit(*child, nodes, packs, *from, &mut { fill });
         });
-        parts.iter().for_each(|(lane, .., span)| root.set(*lane, (span.lo, span.hi)));
-        (self.span.lo, self.span.hi) = root.bounds();
+        for (lane, (.., span)) in parts.into_iter().enumerate() {
+            root.set(lane, span);
+            self.span.join(span);
+        }
     }
 
     /// The first hit that `accept` takes, as [`World::nearest`]; the object is 0.

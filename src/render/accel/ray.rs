@@ -176,7 +176,7 @@ impl Slab {
         if !(near & (longest >= 1.0 / REACH) & (t_min.abs() < f32::INFINITY) & (t_max >= t_min)) {
             return None;
         }
-        let reach = (o - Vec3A::from(span.lo)).abs().max((Vec3A::from(span.hi) - o).abs()).max_element();
+        let reach = (o - span.lo).abs().max((span.hi - o).abs()).max_element();
         let slope = Vec3A::ONE / size.max(Vec3A::splat(longest * (0.5f32).powi(30)));
         let off = (Vec3A::splat(SLACK * reach) + away * (0.5 * SLACK)) * slope * slack;
         let slope = slope.copysign(d);

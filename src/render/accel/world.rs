@@ -120,7 +120,7 @@ impl World {
 
     /// Corner of the box around all objects with the smallest coordinates, and with the largest.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
-        (!self.nodes.is_empty()).then_some((self.span.lo, self.span.hi))
+        (!self.nodes.is_empty()).then_some(self.span.corners())
     }
 
     /// Follow what has moved: a deformed surface is fitted again (or built anew, see [`Accel::update`]), a moved object costs
@@ -156,11 +156,11 @@ impl World {
             if self.objects.iter().any(|o| o.placed.world_from_surface.is_some()) { 16.0 } else { 1.0 };
         let item = |(id, o): (usize, &Object)| {
             let (lo, hi) = o.bounds(self.parts[o.placed.surface].bounds()?)?;
-            Some(Item { lo, id: id as u32, hi })
+            Some(Item::new(lo.into(), hi.into(), id as u32))
         };
         let mut items: Vec<Item> = self.objects.iter().enumerate().filter_map(item).collect();
         self.span = Span::EMPTY;
-        items.iter().for_each(|i| self.span.add(i.lo, i.hi));
+        items.iter().for_each(|i| self.span.join(i.span()));
         let grown = build::grow(&mut items, 1, 1);
         (self.nodes, self.leaves) = (grown.nodes, grown.leaves);
     }
