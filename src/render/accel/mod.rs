@@ -32,7 +32,7 @@ use lanes::{Lanes, Machine, Work};
 use ray::Slab;
 use search::{Any, Nearest, Packs, Search};
 use tree::{Node, Visitor};
-use triangle::{EMPTY, Pack, standing};
+use triangle::{EMPTY, Pack, Vertices, standing};
 
 /// How triangles are found. The answers are the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -54,9 +54,11 @@ const DECAY: f64 = 1.3;
 pub struct Accel {
     kind: Kind,
     machine: Machine,
-    triangles: Vec<[u32; 3]>,
+    /// How many.
+    triangles: usize,
     span: Span,
     packs: Vec<Pack>,
+    vertices: Vec<Vertices>,
     nodes: Vec<Node>,
     /// Where the parts below the root end in `nodes` and `packs`.
     cuts: Vec<[usize; 2]>,
@@ -74,14 +76,15 @@ impl Accel {
         let mut accel = Self {
             kind,
             machine: Machine::new(Isa::Best),
-            triangles: triangles.to_vec(),
+            triangles: triangles.len(),
             span: Span::EMPTY,
             packs: Vec::new(),
+            vertices: Vec::new(),
             nodes: Vec::new(),
             cuts: Vec::new(),
             built: 0.0,
         };
-        accel.build(positions, threads);
+        accel.build(positions, triangles, threads);
         accel
     }
 
@@ -92,16 +95,16 @@ impl Accel {
 
     /// Corner of the box with the smallest coordinates, and with the largest; `None` without triangles.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
-        (!self.triangles.is_empty()).then_some(self.span.corners())
+        (self.triangles > 0).then_some(self.span.corners())
     }
 
-    fn build(&mut self, positions: &[Vec3], threads: usize) {
+    fn build(&mut self, positions: &[Vec3], triangles: &[[u32; 3]], threads: usize) {
         let corner = |&i: &u32| standing(positions[i as usize]);
         let item = |(id, t): (usize, &[u32; 3])| {
             let [a, b, c] = t.each_ref().map(corner);
             Item::new(a.min(b).min(c), a.max(b).max(c), id as u32)
         };
-        let mut items: Vec<Item> = self.triangles.iter().enumerate().map(item).collect();
+        let mut items: Vec<Item> = triangles.iter().enumerate().map(item).collect();
         self.span = Span::EMPTY;
         items.iter().for_each(|i| self.span.join(i.span()));
         let leaves = match self.kind {
@@ -111,14 +114,20 @@ impl Accel {
                 grown.leaves
             }
             Kind::Brute => {
-                let ids: Vec<u32> = (0..self.triangles.len() as u32).collect();
+                let ids: Vec<u32> = (0..self.triangles as u32).collect();
                 let four = |c: &[u32]| std::array::from_fn(|i| c.get(i).copied().unwrap_or(EMPTY));
                 ids.chunks(4).map(four).collect()
             }
         };
+        let known =
+            |ids: &[u32; 4], lane: usize| if ids[lane] == EMPTY { ids[0] } else { ids[lane] } as usize;
+        let corner = |ids: &[u32; 4], c: usize| std::array::from_fn(|lane| triangles[known(ids, lane)][c]);
+        self.vertices = leaves.iter().map(|ids| [corner(ids, 0), corner(ids, 1), corner(ids, 2)]).collect();
         self.packs = leaves.into_iter().map(Pack::new).collect();
-        each(self.packs.chunks_mut(1 << 14).collect(), threads, |packs| {
-            packs.iter_mut().for_each(|p| _ = p.fill(positions, &self.triangles));
+        const SHARE: usize = 1 << 14;
+        let shares = self.packs.chunks_mut(SHARE).zip(self.vertices.chunks(SHARE));
+        each(shares.collect(), threads, |(packs, vertices)| {
+            packs.iter_mut().zip(vertices).for_each(|(p, v)| _ = p.fill(positions, v));
         });
         self.built = self.cost();
     }
@@ -137,17 +146,29 @@ impl Accel {
         self.refit(positions, threads);
         let rebuild = self.cost() > DECAY * self.built;
         if rebuild {
-            self.build(positions, threads);
+            let triangles = self.list();
+            self.build(positions, &triangles, threads);
         }
         rebuild
     }
 
+    /// The triangles as they were given.
+    fn list(&self) -> Vec<[u32; 3]> {
+        let mut list = vec![[0; 3]; self.triangles];
+        for (pack, v) in self.packs.iter().zip(&self.vertices) {
+            for lane in (0..4).filter(|&lane| pack.ids[lane] != EMPTY) {
+                list[pack.ids[lane] as usize] = [v[0][lane], v[1][lane], v[2][lane]];
+            }
+        }
+        list
+    }
+
     fn refit(&mut self, positions: &[Vec3], threads: usize) {
-        let triangles = &self.triangles;
-        let fill = |p: &mut Pack| p.fill(positions, triangles);
+        let vertices = &self.vertices;
         self.span = Span::EMPTY;
         let Some((root, mut nodes)) = self.nodes.split_first_mut() else {
-            return self.packs.iter_mut().for_each(|p| self.span.join(fill(p)));
+            let each = self.packs.iter_mut().zip(vertices);
+            return each.for_each(|(p, v)| self.span.join(p.fill(positions, v)));
         };
         // Cut nodes and leaves where the children of the root end; fit each part from its leaves up, then the root.
         let (mut packs, mut from, mut parts) = (&mut self.packs[..], [1, 0], Vec::new());
@@ -158,7 +179,9 @@ impl Accel {
             (nodes, packs, from) = (rest, others, to);
         }
         each(parts.iter_mut().collect(), threads, |(child, nodes, packs, from, span)| {
-            *span = tree::refit(*child, nodes, packs, *from, &mut { fill });
+            *span = tree::refit(*child, nodes, *from, &mut |leaf| {
+                packs[leaf - from[1]].fill(positions, &vertices[leaf])
+            });
         });
         for (lane, (.., span)) in parts.into_iter().enumerate() {
             root.set(lane, span);

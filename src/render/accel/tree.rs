@@ -117,23 +117,21 @@ pub(super) fn walk<S: Lanes>(nodes: &[Node], slab: &Slab, visitor: &mut impl Vis
     }
 }
 
-/// Fit boxes from the leaves up. `nodes` and `leaves` begin at `from` in the whole; `fit` gives a leaf's box. Gives the box of
-/// `at`.
-pub(super) fn refit<L>(
+/// Fit boxes from the leaves up. `nodes` begin at `from` in the whole; `fit` gives a leaf's box. Gives the box of `at`.
+pub(super) fn refit(
     at: u32,
     nodes: &mut [Node],
-    leaves: &mut [L],
     from: [usize; 2],
-    fit: &mut impl FnMut(&mut L) -> Span,
+    fit: &mut impl FnMut(usize) -> Span,
 ) -> Span {
     if at & LEAF != 0 {
-        return fit(&mut leaves[(at & !LEAF) as usize - from[1]]);
+        return fit((at & !LEAF) as usize);
     }
     let own = at as usize - from[0];
     let mut all = Span::EMPTY;
     for lane in 0..8 {
         if !nodes[own].is_empty(lane) {
-            let span = refit(nodes[own].children[lane], nodes, leaves, from, fit);
+            let span = refit(nodes[own].children[lane], nodes, from, fit);
             nodes[own].set(lane, span);
             all.join(span);
         }

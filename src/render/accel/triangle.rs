@@ -125,6 +125,9 @@ pub struct Pack {
     pub ids: [u32; 4],
 }
 
+/// Which vertices the corners of a pack are: corner, triangle. In the order of the packs, so that fitting them again reads on.
+pub(super) type Vertices = [[u32; 4]; 3];
+
 /// No triangle.
 pub(super) const EMPTY: u32 = u32::MAX;
 
@@ -136,12 +139,10 @@ impl Pack {
 
     /// Take the corners from where they stand now; gives the box around them.
     #[inline(always)]
-    pub fn fill(&mut self, positions: &[Vec3], triangles: &[[u32; 3]]) -> Span {
-        let ids = self.ids.map(|id| if id == EMPTY { self.ids[0] } else { id } as usize);
-        let four = [triangles[ids[0]], triangles[ids[1]], triangles[ids[2]], triangles[ids[3]]];
+    pub fn fill(&mut self, positions: &[Vec3], vertices: &Vertices) -> Span {
         let mut span = Span::EMPTY;
         for c in 0..3 {
-            let p: [Vec3A; 4] = std::array::from_fn(|lane| standing(positions[four[lane][c] as usize]));
+            let p: [Vec3A; 4] = std::array::from_fn(|lane| standing(positions[vertices[c][lane] as usize]));
             span.lo = span.lo.min(p[0].min(p[1])).min(p[2].min(p[3]));
             span.hi = span.hi.max(p[0].max(p[1])).max(p[2].max(p[3]));
             let rows =
