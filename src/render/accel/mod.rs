@@ -16,12 +16,14 @@
 
 mod build;
 mod lanes;
+mod packet;
 mod ray;
 mod search;
 mod tree;
 mod triangle;
 mod world;
 
+pub use packet::PACKET;
 pub use ray::{Hit, Ray, Real};
 pub use world::{Motion, Placed, Surface, Updated, World};
 
@@ -208,7 +210,7 @@ impl Accel {
         slab.t_max = slab.t_max.min(t_max);
         let mut packs = Packs { packs: &self.packs, ray, shear: None, object, search };
         match self.kind {
-            Kind::Tree => tree::walk::<S>(&self.nodes, &slab, &mut packs),
+            Kind::Tree => tree::walk::<S>(&self.nodes, 0, &slab, &mut packs),
             Kind::Brute => {
                 (0..self.packs.len()).fold(slab.t_max, |t, at| packs.leaf::<S>(at as u32, t));
             }

@@ -138,7 +138,7 @@ impl Sealed for f64 {
 }
 
 /// Twice the room for the rounding of origins, slopes and distances: see [`Slab::new`].
-const SLACK: f32 = 24.0 * 0.5 * f32::EPSILON;
+pub(super) const SLACK: f32 = 24.0 * 0.5 * f32::EPSILON;
 
 /// Largest coordinate that is looked at: its products stay finite.
 pub(super) const REACH: f32 = (1u64 << 40) as f32;

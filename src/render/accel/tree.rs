@@ -89,15 +89,14 @@ pub(super) trait Visitor {
     fn leaf<S: Lanes>(&mut self, leaf: u32, t_max: f32) -> f32;
 }
 
-/// Visit the leaves that a ray enters, about nearest first.
+/// Visit the leaves below a node that a ray enters, about nearest first.
 #[inline(always)]
-pub(super) fn walk<S: Lanes>(nodes: &[Node], slab: &Slab, visitor: &mut impl Visitor) {
+pub(super) fn walk<S: Lanes>(nodes: &[Node], mut at: u32, slab: &Slab, visitor: &mut impl Visitor) {
     if nodes.is_empty() {
         return;
     }
     let (ray, mut t_max) = (S::ray(slab), slab.t_max);
     let mut stack = Stack::new();
-    let mut at = 0;
     loop {
         if at & LEAF == 0 {
             if let Some(child) = S::enter(&nodes[at as usize], &ray, t_max, &mut stack) {
