@@ -42,26 +42,29 @@ struct Rays {
     far: [[F8; 2]; 3],
     t_min: [F8; 2],
     t_max: [F8; 2],
-    octant: usize,
 }
 
 impl Packet {
     /// `None` unless all rays go into one octant and can hit something.
+    #[inline(always)]
     pub fn new(rays: &[Ray<f32>], span: &Span, slack: f32) -> Option<Self> {
         let first = Slab::new(rays.first()?, span, slack)?;
-        let mut slabs = [first; PACKET];
-        for (slab, ray) in slabs.iter_mut().zip(rays) {
-            *slab = Slab::new(ray, span, slack).filter(|s| s.octant == first.octant)?;
-        }
+        let (mut slabs, mut wide) = ([first; PACKET], Rays::EMPTY);
         let (mut from, mut to, mut slopes) = (Span::EMPTY, Span::EMPTY, Span::EMPTY);
         let (mut t_min, mut t_max) = (f32::INFINITY, 0.0f32);
-        for (slab, r) in slabs.iter().zip(rays) {
+        for (i, r) in rays.iter().enumerate() {
+            let slab = Slab::new(r, span, slack)?;
+            if slab.octant != first.octant {
+                return None;
+            }
             let (o, d) = (Vec3A::from(r.origin), Vec3A::from(r.direction));
             let end = o + d * r.t_max;
             from.join(Span { lo: o, hi: o });
             to.join(Span { lo: end, hi: end });
             slopes.join(Span { lo: slab.slope, hi: slab.slope });
             (t_min, t_max) = (t_min.min(slab.t_min), t_max.max(slab.t_max));
+            wide.set(i, &slab);
+            slabs[i] = slab;
         }
         // Rays that meet, as in a lamp, are narrower when looked at from there.
         let extent = |s: &Span| (s.hi - s.lo).max_element();
@@ -76,7 +79,7 @@ impl Packet {
         let (low, high) = (from.lo - off, from.hi + off);
         let negative = slopes.lo.cmplt(Vec3A::ZERO);
         Some(Self {
-            rays: Rays::new(&slabs),
+            rays: wide,
             slabs,
             enter: Vec3A::select(negative, low, high),
             leave: Vec3A::select(negative, high, low),
@@ -104,29 +107,32 @@ impl Packet {
 }
 
 impl Rays {
-    fn new(slabs: &[Slab; PACKET]) -> Self {
-        let lanes = |f: &dyn Fn(&Slab) -> f32| {
-            let half = |h: usize| F8(std::array::from_fn(|i| f(&slabs[8 * h + i])));
-            [half(0), half(1)]
-        };
-        Self {
-            slope: [0, 1, 2].map(|k| lanes(&|s| s.slope[k])),
-            near: [0, 1, 2].map(|k| lanes(&|s| s.near[k])),
-            far: [0, 1, 2].map(|k| lanes(&|s| s.far[k])),
-            t_min: lanes(&|s| s.t_min),
-            t_max: lanes(&|s| s.t_max),
-            octant: slabs[0].octant,
+    /// No rays: nothing is entered.
+    const EMPTY: Self = {
+        let (none, zero) = ([F8([f32::NEG_INFINITY; 8]); 2], [[F8::ZERO; 2]; 3]);
+        Self { slope: zero, near: zero, far: zero, t_min: [F8::ZERO; 2], t_max: none }
+    };
+
+    #[inline(always)]
+    fn set(&mut self, i: usize, slab: &Slab) {
+        let (half, lane) = (i / 8, i % 8);
+        for k in 0..3 {
+            self.slope[k][half].0[lane] = slab.slope[k];
+            self.near[k][half].0[lane] = slab.near[k];
+            self.far[k][half].0[lane] = slab.far[k];
         }
+        self.t_min[half].0[lane] = slab.t_min;
+        self.t_max[half].0[lane] = slab.t_max;
     }
 
     /// Rays that enter a child, a bit each.
     #[inline(always)]
-    fn entering(&self, node: &Node, lane: usize) -> u32 {
+    fn entering(&self, octant: usize, node: &Node, lane: usize) -> u32 {
         let mut bits = 0;
         for half in 0..2 {
             let (mut enter, mut leave) = (self.t_min[half], self.t_max[half]);
             for k in 0..3 {
-                let row = k + 3 * (self.octant >> k & 1);
+                let row = k + 3 * (octant >> k & 1);
                 let (near, far) = (node.planes[row].0[lane], node.planes[(row + 3) % 6].0[lane]);
                 let slope = self.slope[k][half];
                 enter = (slope * near - self.near[k][half]).max(enter);
@@ -163,7 +169,7 @@ pub(super) fn walk(nodes: &[Node], packet: &Packet, alive: u32, crew: &mut impl 
         while bits != 0 {
             let lane = bits.trailing_zeros() as usize;
             bits &= bits - 1;
-            let inside = packet.rays.entering(node, lane) & mask & !done;
+            let inside = packet.rays.entering(packet.slabs[0].octant, node, lane) & mask & !done;
             match node.children[lane] {
                 _ if inside == 0 => {}
                 leaf if leaf & LEAF != 0 => done |= crew.leaf(leaf & !LEAF, inside),
