@@ -3,7 +3,7 @@
 use super::sheet::Painter;
 use super::time::Frame;
 use crate::cli::{Failure, say::Say};
-use sinew::frames::{FrameStats, Moment, Shot, Stop, Worker, in_order_pairs};
+use sinew::frames::{FrameStats, Moment, Shot, Stop, Worker, in_order, in_order_pairs};
 use sinew::image::{Image, Rgba8};
 use sinew::io::manifest::sha256;
 use sinew::io::picture::{
@@ -146,42 +146,43 @@ fn refuse_existing(job: &Job) -> Result<(), Failure> {
 }
 
 /// Draws one moment.
-type Shoot<P> = fn(&Job, Moment, &mut Worker) -> (P, FrameStats);
+type Shoot<P> = fn(&Job, Moment, &mut Worker, &mut P) -> FrameStats;
 
 /// As it is shown: painted, where there is pixel art.
-fn shoot(job: &Job, moment: Moment, worker: &mut Worker) -> (Rgba8, FrameStats) {
-    let mut out = Rgba8::default();
-    let stats = job.shot.draw(moment, worker, &mut out);
-    match &job.art {
-        Some(art) => (art.paint(&out), stats),
-        None => (out, stats),
+fn shoot(job: &Job, moment: Moment, worker: &mut Worker, out: &mut Rgba8) -> FrameStats {
+    let stats = job.shot.draw(moment, worker, out);
+    if let Some(art) = &job.art {
+        *out = art.paint(out);
     }
+    stats
 }
 
-fn shoot_linear(job: &Job, moment: Moment, worker: &mut Worker) -> (Image, FrameStats) {
-    let mut out = Image::default();
-    let stats = job.shot.draw_linear(moment, worker, &mut out);
-    (out, stats)
+fn shoot_linear(job: &Job, moment: Moment, worker: &mut Worker, out: &mut Image) -> FrameStats {
+    job.shot.draw_linear(moment, worker, out)
 }
 
 /// Draw moments in parallel, encode each beside the one before on a worker, and hand the results on in order.
-fn draw<P: Send + Sync, S, T: Send>(
+fn draw<S, T: Send>(
     job: &Job,
     frames: &[Frame],
-    shoot: Shoot<P>,
     state: impl Fn() -> S + Sync,
-    encode: impl Fn(&mut S, Option<&P>, &P) -> T + Sync,
+    encode: impl Fn(&mut S, Option<&Rgba8>, &Rgba8) -> T + Sync,
     mut receive: impl FnMut(&mut Written, usize, T) -> Result<(), picture::Error>,
 ) -> Result<Written, Fault> {
     let mut fault = None;
     let mut written = Written::default();
     let start = || (Worker::default(), state());
-    let first = |(worker, _): &mut (Worker, S), i: usize| shoot(job, frames[i].moment, worker);
-    let second = |(_, s): &mut (Worker, S), before: Option<&(P, FrameStats)>, now: &(P, FrameStats)| {
-        let start = Instant::now();
-        let encoded = encode(s, before.map(|b| &b.0), &now.0);
-        (encoded, now.1, start.elapsed())
+    let first = |(worker, _): &mut (Worker, S), i: usize| {
+        let mut picture = Rgba8::default();
+        let stats = shoot(job, frames[i].moment, worker, &mut picture);
+        (picture, stats)
     };
+    let second =
+        |(_, s): &mut (Worker, S), before: Option<&(Rgba8, FrameStats)>, now: &(Rgba8, FrameStats)| {
+            let start = Instant::now();
+            let encoded = encode(s, before.map(|b| &b.0), &now.0);
+            (encoded, now.1, start.elapsed())
+        };
     let done =
         in_order_pairs(frames.len(), job.threads, start, first, second, |i, (result, stats, encode)| {
             let start = Instant::now();
@@ -194,15 +195,26 @@ fn draw<P: Send + Sync, S, T: Send>(
                 Stop
             })
         });
-    match (done, fault) {
-        (Ok(()), _) => Ok(written),
-        (_, Some(e)) => Err(Fault::Write(e)),
-        (Err(Stop), None) => Err(Fault::Stopped),
-    }
+    ended(done, fault, written)
+}
+
+/// What became of a still.
+#[derive(Default)]
+struct Still {
+    stats: FrameStats,
+    hash: Option<String>,
+    /// As it left the encoder; kept only for a pipe, which takes frames in order.
+    bytes: Vec<u8>,
+    size: usize,
+    encode: Duration,
+    write: Duration,
 }
 
 /// A picture a frame, each into a file of its own or one after the other to standard output.
-fn stills<P: Send + Sync>(
+///
+/// Workers write the files, each as soon as it is encoded, and draw into one picture again and again: new memory for every
+/// picture costs more than encoding it.
+fn stills<P: Default>(
     job: &Job,
     say: &Say,
     shoot: Shoot<P>,
@@ -210,33 +222,59 @@ fn stills<P: Send + Sync>(
 ) -> Result<Written, Fault> {
     let folder = if matches!(job.target, Target::Sequence(..)) { Folder::Create } else { Folder::MustExist };
     let bar = say.progress(job.frames.len());
-    let encode = |(): &mut (), _: Option<&P>, picture: &P| {
-        encode(picture).map(|bytes| (job.hash.then(|| sha256(&bytes)), bytes))
+    let still = |(worker, picture): &mut (Worker, P), i: usize| -> Result<Still, picture::Error> {
+        let stats = shoot(job, job.frames[i].moment, worker, picture);
+        let start = Instant::now();
+        let bytes = encode(picture)?;
+        let hash = job.hash.then(|| sha256(&bytes));
+        let mut still = Still { stats, hash, size: bytes.len(), encode: start.elapsed(), ..Still::default() };
+        let start = Instant::now();
+        match job.target.path_of(job.frames[i].number) {
+            Some(path) => AtomicFile::write(path, &bytes, job.force, folder)?,
+            None => still.bytes = bytes,
+        }
+        still.write = start.elapsed();
+        Ok(still)
     };
-    let written = draw(
-        job,
-        job.frames,
-        shoot,
-        || (),
-        encode,
-        |written, i, result| {
-            let (hash, bytes) = result?;
-            written.hashes.extend(hash);
-            written.bytes += bytes.len() as u64;
-            match job.target.path_of(job.frames[i].number) {
-                Some(path) => AtomicFile::write(path, &bytes, job.force, folder)?,
-                None => {
-                    let mut out = Output::stdout(false);
-                    out.write_all(&bytes).map_err(|source| picture::Error::Stdout { source })?;
-                    out.commit()?;
-                }
-            }
-            bar.inc(1);
-            Ok(())
-        },
-    );
+    let (mut written, mut fault) = (Written::default(), None);
+    let state = || (Worker::default(), P::default());
+    let done = in_order(job.frames.len(), job.threads, state, still, |_, result| {
+        let received = result.and_then(|s| written.add(s));
+        bar.inc(1);
+        received.map_err(|e| {
+            fault = Some(e);
+            Stop
+        })
+    });
     bar.finish_and_clear();
-    written
+    ended(done, fault, written)
+}
+
+/// What a run of workers came to.
+fn ended(done: Result<(), Stop>, fault: Option<picture::Error>, written: Written) -> Result<Written, Fault> {
+    match (done, fault) {
+        (Ok(()), _) => Ok(written),
+        (_, Some(e)) => Err(Fault::Write(e)),
+        (Err(Stop), None) => Err(Fault::Stopped),
+    }
+}
+
+impl Written {
+    /// Count a still, and send it to the pipe if it waits for that.
+    fn add(&mut self, still: Still) -> Result<(), picture::Error> {
+        let start = Instant::now();
+        if !still.bytes.is_empty() {
+            let mut out = Output::stdout(false);
+            out.write_all(&still.bytes).map_err(|source| picture::Error::Stdout { source })?;
+            out.commit()?;
+        }
+        self.hashes.extend(still.hash);
+        self.drawn += still.stats;
+        self.bytes += still.size as u64;
+        self.encode += still.encode;
+        self.write += still.write + start.elapsed();
+        Ok(())
+    }
 }
 
 /// All frames into one file.
@@ -265,7 +303,7 @@ fn write_film(job: &Job, say: &Say) -> Result<Written, Fault> {
         encoder.encode(before, now).map(|frame| (hash, frame))
     };
     let state = || FrameEncoder::new(film, &coding);
-    let mut written = draw(job, job.frames, shoot, state, encode, |written, _, result| {
+    let mut written = draw(job, job.frames, state, encode, |written, _, result| {
         let (hash, frame) = result?;
         written.hashes.extend(hash);
         bar.inc(1);
@@ -294,7 +332,6 @@ fn gif_coding(job: &Job, film: &Film, say: &Say) -> Result<Coding, Fault> {
     draw(
         job,
         &spread,
-        shoot,
         || (),
         keep,
         |_, _, picture| {
