@@ -1,6 +1,8 @@
 use super::*;
 use crate::test_rng::Rng;
 
+const KINDS: [Kind; 4] = [Kind::Brute, Kind::Tree, Kind::Octree, Kind::Grid];
+
 /// Triangles anywhere, large and small.
 fn soup(rng: &mut Rng, n: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let mut positions = Vec::new();
@@ -38,7 +40,7 @@ fn agree<R: Real>(kinds: &[Accel], rays: usize) {
 #[test]
 fn every_kind_gives_the_same_hits() {
     let (positions, triangles) = soup(&mut Rng::new(1), 700);
-    let kinds = [Kind::Tree, Kind::Brute].map(|k| Accel::new(k, &positions, &triangles, 1));
+    let kinds = KINDS.map(|k| Accel::new(k, &positions, &triangles, 1));
     agree::<f32>(&kinds, 3000);
     agree::<f64>(&kinds, 1000);
 }
