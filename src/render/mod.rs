@@ -1,5 +1,6 @@
 //! Scenes to pictures.
 
+pub mod accel;
 pub mod backdrop;
 pub mod channel;
 pub mod footprint;
