@@ -67,8 +67,11 @@ const ROOMS: &[(&str, &[&str])] = &[
 ];
 
 /// Files below one room that must not know each other.
-const STRANGERS: &[(&str, &[&str])] =
-    &[("skin", &["linear", "rigid"]), ("io", &["gltf", "notes", "picture", "rig_json", "sheet_json"])];
+const STRANGERS: &[(&str, &[&str])] = &[
+    ("skin", &["linear", "rigid"]),
+    ("render", &["raster", "ray"]),
+    ("io", &["gltf", "notes", "picture", "rig_json", "sheet_json"]),
+];
 
 #[test]
 fn arrows_go_one_way() {

@@ -18,7 +18,7 @@ use sinew::scene::{Light, LightKind, Lighting, Material, MaterialPatch, Scene, S
 use std::collections::BTreeSet;
 
 fn sun(direction: Vec3) -> Light {
-    Light { kind: LightKind::Directional { direction: direction.normalize() }, color: Vec3::ONE }
+    Light::new(LightKind::Directional { direction: direction.normalize() }, Vec3::ONE)
 }
 
 /// A ball of radius 1 around the origin with a ball's normals.
@@ -329,7 +329,7 @@ fn both_builds_of_the_kernels_draw_the_same_styles() {
     stage.materials.push(Material { specular: Vec3::splat(0.5), ..matt(0.6) });
     let map = map_of(&stage.scene(), direction, [Vec3::splat(-3.0), Vec3::splat(3.0)], 128);
     for toon in [None, Some(4)] {
-        let style = Style { below: Some(Vec3::splat(0.1)), toon, shadow: Some(&map) };
+        let style = Style { below: Some(Vec3::splat(0.1)), toon, shadow: Some(&map), sky: None };
         let scene = Scene { style, ..stage.scene() };
         assert!(linear(&scene, 150, Isa::Best) == linear(&scene, 150, Isa::Portable), "{toon:?}");
     }
@@ -428,7 +428,7 @@ fn shipped_looks_load_and_broken_ones_do_not_panic() {
 #[test]
 fn unlit_surfaces_know_no_tones_and_no_shadows() {
     let stage = Stage::of(from_front(5.0, 2.0), Mesh::new(quad(1.0, 0.0)).unwrap(), material(Vec4::ONE));
-    let style = Style { below: Some(Vec3::ZERO), toon: Some(2), shadow: None };
+    let style = Style { below: Some(Vec3::ZERO), toon: Some(2), shadow: None, sky: None };
     let picture = linear(&Scene { style, ..stage.scene() }, 8, Isa::Best);
     assert!(picture.pixels.iter().all(|p| *p == [1.0; 4]));
 }

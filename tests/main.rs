@@ -20,8 +20,11 @@ mod looks;
 #[cfg(feature = "pictures")]
 mod picture;
 mod raster;
+mod ray;
 #[path = "../src/test_rng.rs"]
 mod rng;
+#[cfg(feature = "cli")]
+mod scenes;
 #[cfg(feature = "cli")]
 mod sheet;
 #[cfg(all(feature = "io", feature = "pictures"))]

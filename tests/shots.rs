@@ -125,7 +125,8 @@ fn a_pixel_has_a_surface_exactly_where_it_has_alpha() {
             shot.draw(0.2, &mut worker, &mut picture);
             shot.draw_channels(0.2, &mut worker, &Channel::ALL, &mut seen);
             for (i, p) in picture.data.as_chunks::<4>().0.iter().enumerate() {
-                let there = (seen.objects[i] > 0, seen.depth[i].is_finite(), seen.normals[i].length() > 0.9);
+                let named = seen.objects[i] > 0 && seen.labels[i] > 0;
+                let there = (named, seen.depth[i].is_finite(), seen.normals[i].length() > 0.9);
                 let alpha = p[3] > 0;
                 assert_eq!(there, (alpha, alpha, alpha), "{name}, {samples} samples, pixel {i}");
             }

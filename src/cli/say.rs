@@ -76,6 +76,17 @@ impl Say {
         bar
     }
 
+    /// A bar for the parts of one picture.
+    pub fn picture_progress(&self) -> indicatif::ProgressBar {
+        let bar = self.progress(1000);
+        if let Ok(style) =
+            indicatif::ProgressStyle::with_template("{percent}% [{bar:30}] {elapsed} gone, {eta} left")
+        {
+            bar.set_style(style);
+        }
+        bar
+    }
+
     fn paint(&self, text: &str, code: &str) -> String {
         if self.color { format!("\x1b[{code}m{text}\x1b[0m") } else { text.into() }
     }

@@ -82,14 +82,23 @@ impl Figure {
     pub fn scene<'s>(&'s self, of_character: Scene<'s>, positions: &'s [Vec3]) -> Scene<'s> {
         let from = Vec3::new(-0.45, 0.7, 0.6).normalize();
         let direction = -of_character.camera.scene_from_view.transform_vector3(from);
-        let object =
-            Object { mesh: &self.mesh, positions, normals: &[], tangents: &[], material: 0, mirrored: false };
+        let mesh = &self.mesh;
+        let object = Object {
+            mesh,
+            positions,
+            normals: &[],
+            tangents: &[],
+            material: 0,
+            mirrored: false,
+            labels: &[],
+        };
         Scene {
             ambient: Vec3::splat(0.3),
-            lights: vec![Light { kind: LightKind::Directional { direction }, color: Vec3::splat(0.85) }],
+            lights: vec![Light::new(LightKind::Directional { direction }, Vec3::splat(0.85))],
             style: Style::default(),
             background: [0.0; 4],
             objects: vec![object],
+            shapes: &[],
             materials: &*MATERIALS,
             textures: &[],
             ..of_character

@@ -4,11 +4,11 @@ use super::fit::{self, Span};
 use super::look::{GroundLook, Look, Shadows};
 use super::{ShotDesc, Worker};
 use crate::image::Image;
-use crate::render::Settings;
 use crate::render::backdrop::{Backdrop, Ground};
 use crate::render::footprint::Footprint;
-use crate::render::raster::{IdImage, Rasterizer, Stats};
+use crate::render::raster::{IdImage, Stats};
 use crate::render::shadow::{ShadowDesc, ShadowMaker};
+use crate::render::{Painter, Renderer, Settings};
 use crate::scene::{AlphaMode, Camera, LightKind, Material, Projection, Scene, ShadowMap};
 use glam::Vec3;
 
@@ -69,7 +69,7 @@ impl Stage {
         &self,
         desc: &ShotDesc,
         scene: &Scene,
-        rasterizer: &mut Rasterizer,
+        painter: &mut Painter,
         effects: &mut Effects,
         out: &mut Image,
     ) -> Stats {
@@ -78,7 +78,7 @@ impl Stage {
         let mut stats = self.shadows(look, settings, &caster, effects);
         let mut scene = Scene { background: [0.0; 4], ..scene.clone() };
         let Effects { key, fine, ids, .. } = effects;
-        if look.shadows == Shadows::Map && key.size > 0 {
+        if look.shadows == Shadows::Map && key.size > 0 && desc.renderer == Renderer::Raster {
             scene.style.shadow = Some(key);
         }
 
@@ -86,9 +86,9 @@ impl Stage {
         let finer = if look.tones().is_some() || look.outline.is_some() { FINER } else { 1 };
         let large = Settings { width: finer * settings.width, height: finer * settings.height, ..*settings };
         if finer == 1 || large.check().is_err() {
-            stats += self.figure(look, &scene, &caster, settings, 1.0, rasterizer, ids, out);
+            stats += self.figure(look, &scene, &caster, settings, 1.0, painter, ids, out);
         } else {
-            stats += self.figure(look, &scene, &caster, &large, finer as f32, rasterizer, ids, fine);
+            stats += self.figure(look, &scene, &caster, &large, finer as f32, painter, ids, fine);
             average(fine, finer, out);
         }
         stats
@@ -126,13 +126,13 @@ impl Stage {
         caster: &Scene,
         settings: &Settings,
         scale: f32,
-        rasterizer: &mut Rasterizer,
+        painter: &mut Painter,
         ids: &mut IdImage,
         out: &mut Image,
     ) -> Stats {
-        let mut stats = rasterizer.draw_linear(scene, settings, out);
+        let mut stats = painter.draw_linear(scene, settings, out);
         if let Some(mut line) = look.outline {
-            stats += rasterizer.draw_ids(caster, settings, ids);
+            stats += painter.rasterizer.draw_ids(caster, settings, ids);
             line.width *= scale;
             let (slope, perspective) = match scene.camera.projection {
                 Projection::Perspective { fov_y } => (2.0 * (0.5 * fov_y).tan(), true),

@@ -36,6 +36,18 @@ pub(super) fn bounds(span: &Span, anchor: Option<(BoneId, DVec3)>, worker: &mut 
     [low, high]
 }
 
+/// A moment each 24th of a second of the clip, both ends included, and the vertices of one; long clips of large meshes are looked at
+/// more thinly.
+pub(super) fn times(span: &Span) -> (Vec<f64>, usize) {
+    let character = &span.asset.character;
+    let vertices: usize = character.instances().iter().map(|i| character.mesh(i).positions.len()).sum();
+    let most = (Framing::VERTICES / vertices.max(1)).clamp(Framing::FEWEST, Framing::MOST);
+    let range = span.range();
+    let count = (range.duration() * 24.0).clamp(0.0, (most - 1) as f64).ceil() as usize + 1;
+    let time = |k: usize| range.start + range.duration() * k as f64 / (count - 1).max(1) as f64;
+    ((0..count).map(time).collect(), vertices)
+}
+
 /// Vertices of all moments from which on several threads are worth their start.
 const PARALLEL: usize = 1 << 20;
 
@@ -53,14 +65,10 @@ pub(super) fn each_moment(
     let solid = |i: usize| !character.mesh(&character.instances()[i]).triangles.is_empty();
     let instances: Vec<usize> = (0..character.instances().len()).filter(|&i| solid(i)).collect();
 
-    // A moment each 24th of a second, both ends included; long clips of large meshes are looked at more thinly.
-    let vertices: usize = character.instances().iter().map(|i| character.mesh(i).positions.len()).sum();
-    let most = (Framing::VERTICES / vertices.max(1)).clamp(Framing::FEWEST, Framing::MOST);
-    let range = span.range();
-    let moments = (range.duration() * 24.0).clamp(0.0, (most - 1) as f64).ceil() as usize + 1;
+    let (times, vertices) = times(span);
+    let moments = times.len();
     let look = |worker: &mut Worker, k: usize, see: &mut dyn FnMut(&[Vec3])| {
-        let t = range.start + range.duration() * k as f64 / (moments - 1).max(1) as f64;
-        worker.evaluate(span.asset, span.clip, t);
+        worker.evaluate(span.asset, span.clip, times[k]);
         let Worker { pose, posed, scratch, .. } = worker;
         let center = span.center + anchor.map_or(DVec3::ZERO, |(bone, at)| posed.origin(bone) - at);
         let mut points = Vec::new();

@@ -55,7 +55,7 @@ pub struct Look {
     pub outline: Option<Outline>,
     /// What the character stands on; seen from above only.
     pub ground: Option<GroundLook>,
-    /// What throws shadows.
+    /// What throws shadows on the ground, and by the rasterizer; rays throw all lamps' shadows.
     pub shadows: Shadows,
     /// Changes of the asset's materials, in order.
     pub materials: Vec<MaterialPatch>,
@@ -74,6 +74,12 @@ impl Look {
         let toon = matches!(self.shading, Shading::Toon(_));
         let ground = self.ground.is_some() || self.shadows == Shadows::Map;
         toon || ground || self.outline.is_some() || self.background_bottom.is_some()
+    }
+
+    /// What mirrored rays see where nothing is; a background that is not there is black.
+    pub(super) fn sky(&self) -> Option<[Vec3; 2]> {
+        let of = |c: [f32; 4]| (c[3] >= 1.0).then(|| Vec3::new(c[0], c[1], c[2]));
+        of(self.background_bottom?).and_then(|below| Some([of(self.background)?, below]))
     }
 
     /// Steps of the tone ramp.
@@ -118,15 +124,15 @@ pub(super) fn lights(
     center: DVec3,
     camera: &Camera,
 ) -> Lit {
-    let toon = look.tones();
+    let (toon, sky) = (look.tones(), look.sky());
     let Some(lighting) = &look.lighting else {
         let (ambient, lights) = of_asset(mounted, posed, center, camera);
-        return Lit { ambient, style: Style { toon, ..Style::default() }, lights };
+        return Lit { ambient, style: Style { toon, sky, ..Style::default() }, lights };
     };
     let below = (lighting.below != lighting.above).then_some(lighting.below);
     Lit {
         ambient: lighting.above,
-        style: Style { below, toon, ..Style::default() },
+        style: Style { below, toon, sky, ..Style::default() },
         lights: lighting.lamps.iter().map(|l| placed(l, center, camera)).collect(),
     }
 }
@@ -145,7 +151,7 @@ fn of_asset(mounted: &[MountedLight], posed: &Posed, center: DVec3, camera: &Cam
     }
     let lamp = |from: Vec3, color: Vec3| {
         let direction = -camera.scene_from_view.transform_vector3(from.normalize());
-        Light { kind: LightKind::Directional { direction }, color }
+        Light::new(LightKind::Directional { direction }, color)
     };
     let key = lamp(Vec3::new(-0.55, 0.75, 0.65), Vec3::new(0.92, 0.9, 0.86));
     let fill = lamp(Vec3::new(0.9, 0.15, 0.5), Vec3::new(0.2, 0.22, 0.26));

@@ -16,6 +16,7 @@ mod stroke;
 mod view;
 mod worker;
 
+pub use channels::Extent;
 pub use framing::{Framing, Turns};
 pub use look::{GroundLook, Look, Shading, Shadows};
 pub use ordered::{Stop, in_order, in_order_pairs};
@@ -30,8 +31,9 @@ use crate::fk::Posed;
 use crate::image::develop::Developer;
 use crate::image::{Image, Rgba8};
 use crate::render::raster::{IdImage, Stats};
-use crate::render::{Settings, Window};
-use crate::scene::{Camera, Material, Object, Scene};
+use crate::render::ray::Outcome;
+use crate::render::{Painter, Renderer, Settings, Window};
+use crate::scene::{Camera, Material, Object, Scene, Shape};
 use crate::skin::Deformed;
 use crate::time::{self, Range, Wrap};
 use effects::Stage;
@@ -39,6 +41,7 @@ use fit::Span;
 use glam::DVec3;
 use overlay::Layers;
 use stand::Stand;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
@@ -55,8 +58,12 @@ pub struct ShotDesc {
     pub framing: FramingDesc,
     /// Light and background.
     pub look: Look,
+    /// What stands around the character.
+    pub props: Props,
     /// What is drawn with the character.
     pub overlays: Overlays,
+    /// Who draws the character.
+    pub renderer: Renderer,
     /// Size and samples of the pictures.
     pub settings: Settings,
     /// The part of the pictures that is drawn: to the same bytes as in the whole.
@@ -72,11 +79,22 @@ impl Default for ShotDesc {
             view: View::default(),
             framing: FramingDesc::default(),
             look: Look::default(),
+            props: Props::default(),
             overlays: Overlays::default(),
+            renderer: Renderer::default(),
             settings: Settings::default(),
             crop: None,
         }
     }
+}
+
+/// Shapes around a character, world space, and what they are made of. The rasterizer does not draw them.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Props {
+    /// Spheres, planes and triangles; their materials index `materials`.
+    pub shapes: Vec<Shape>,
+    /// Not touched by the look.
+    pub materials: Vec<Material>,
 }
 
 /// One picture of a shot.
@@ -106,13 +124,17 @@ pub struct Shot<'a> {
     stand: Stand<'a>,
     layers: Layers,
     range: Range,
-    /// The asset's materials, and the one that meshes without a material wear.
+    /// The asset's materials, the one that meshes without a material wear, and those of the props.
     materials: Vec<Material>,
+    /// The props, scene space.
+    shapes: Vec<Shape>,
     /// The world point that the scene's frame has its origin at.
     center: DVec3,
     /// What the look needs beside the scene itself.
     stage: Option<Stage>,
     developer: Developer,
+    /// For each instance the bones, from 1, that its vertices follow most; made when they are asked for.
+    labels: OnceLock<Vec<Vec<u32>>>,
 }
 
 /// What a frame cost.
@@ -124,6 +146,8 @@ pub struct FrameStats {
     pub vertices: usize,
     /// What the rasterizer counted.
     pub raster: Stats,
+    /// What rays did.
+    pub rays: Outcome,
     /// Where the time went.
     pub times: Times,
 }
@@ -144,6 +168,12 @@ impl std::ops::AddAssign for FrameStats {
         self.bones += o.bones;
         self.vertices += o.vertices;
         self.raster += o.raster;
+        // The fewest of any picture.
+        self.rays.samples = match self.rays.samples {
+            0 => o.rays.samples,
+            n => n.min(o.rays.samples.max(1)),
+        };
+        self.rays.count += o.rays.count;
         self.times.pose += o.times.pose;
         self.times.deform += o.times.deform;
         self.times.draw += o.times.draw;
@@ -161,20 +191,37 @@ impl<'a> Shot<'a> {
     /// # Panics
     /// If the asset has no such clip.
     pub fn new(asset: &'a Asset, desc: ShotDesc) -> Result<Self, ViewError> {
-        let materials = look::materials(asset, &desc.look);
+        let mut materials = look::materials(asset, &desc.look);
+        let own = materials.len();
+        materials.extend(desc.props.materials.iter().cloned());
         let aspect = aspect(&desc.settings);
         let range = desc.clip.map(|c| asset.character.clips()[c].playback()).unwrap_or_default();
         let mut worker = Worker::default();
         worker.evaluate(asset, desc.clip, range.start);
         let center = asset.character.center(&worker.posed);
         let span = Span { asset, clip: desc.clip, center };
+        let placed = |s: &Shape| Shape { geometry: s.geometry.moved(-center), material: own + s.material };
+        let shapes = desc.props.shapes.iter().map(placed).collect();
         let stand = Stand::new(&span, &desc.view, desc.framing, aspect, &mut worker)?;
         let stage = Stage::new(&span, &desc.look, &materials, &mut worker);
         let layers = Layers::new(&span, &desc.overlays, &mut worker)?;
         let developer = desc.look.grade.developer();
         static SHOTS: AtomicU64 = AtomicU64::new(1);
-        let number = SHOTS.fetch_add(1, Ordering::Relaxed);
-        Ok(Self { number, asset, desc, stand, range, materials, center, stage, layers, developer })
+        let (number, labels) = (SHOTS.fetch_add(1, Ordering::Relaxed), OnceLock::new());
+        Ok(Self {
+            number,
+            asset,
+            desc,
+            stand,
+            range,
+            materials,
+            shapes,
+            center,
+            stage,
+            layers,
+            developer,
+            labels,
+        })
     }
 
     /// What was asked for.
@@ -192,10 +239,13 @@ impl<'a> Shot<'a> {
         ground_point(self.asset, self.desc.clip)
     }
 
-    /// Names of the objects that pixels may show, in order: those of the meshes that the character's instances wear.
+    /// Names of the objects that pixels may show, in order: those of the meshes that the character's instances wear, and, where rays
+    /// draw, shapes.
     pub fn object_names(&self) -> Vec<String> {
         let character = &self.asset.character;
-        character.instances().iter().map(|i| character.mesh(i).name.clone()).collect()
+        let meshes = character.instances().iter().map(|i| character.mesh(i).name.clone());
+        let shapes = if self.desc.renderer == Renderer::Raster { 0 } else { self.shapes.len() };
+        meshes.chain((1..=shapes).map(|i| format!("shape {i}"))).collect()
     }
 
     /// Pixels a row, and rows, of its pictures.
@@ -244,7 +294,9 @@ impl<'a> Shot<'a> {
     ///
     /// Objects are the character's mesh instances, in order.
     pub fn draw_ids(&self, moment: impl Into<Moment>, worker: &mut Worker, out: &mut IdImage) -> FrameStats {
-        self.with_scene(moment.into(), worker, |scene, w| w.draw_ids(scene, &self.desc.settings, out))
+        self.with_scene(moment.into(), worker, |scene, w| {
+            w.rasterizer.draw_ids(scene, &self.desc.settings, out)
+        })
     }
 
     /// Pose and deform the character, and hand the scene of the moment to a renderer.
@@ -252,15 +304,18 @@ impl<'a> Shot<'a> {
         &self,
         moment: Moment,
         worker: &mut Worker,
-        draw: impl FnOnce(&Scene, &mut crate::render::raster::Rasterizer) -> Stats,
+        draw: impl FnOnce(&Scene, &mut Painter) -> Stats,
     ) -> FrameStats {
         let mut stats = FrameStats::default();
         self.pose(moment.time, worker, &mut stats);
         let start = Instant::now();
         let camera = self.stand.camera(moment, &worker.posed, &worker.deformed);
         let scene = self.scene(camera, &worker.posed, &worker.deformed);
-        worker.rasterizer.set_window(self.desc.crop);
-        stats.raster = draw(&scene, &mut worker.rasterizer);
+        let painter = &mut worker.painter;
+        painter.set_window(self.desc.crop);
+        (painter.renderer, painter.outcome) = (self.desc.renderer, Outcome::default());
+        stats.raster = draw(&scene, painter);
+        stats.rays = painter.outcome;
         stats.times.draw = start.elapsed();
         stats
     }
@@ -283,8 +338,9 @@ impl<'a> Shot<'a> {
 
     fn scene<'s>(&'s self, camera: Camera, posed: &Posed, deformed: &'s [Deformed]) -> Scene<'s> {
         let character = &self.asset.character;
-        let plain = self.materials.len() - 1;
-        let object = |(inst, d): (&Instance, &'s Deformed)| {
+        let plain = self.asset.materials.len();
+        let labels = self.labels.get();
+        let object = |(i, (inst, d)): (usize, (&Instance, &'s Deformed))| {
             let mesh = &character.meshes()[inst.mesh.0 as usize];
             let material = mesh.material.map_or(plain, |m| (m.0 as usize).min(plain));
             Object {
@@ -294,6 +350,7 @@ impl<'a> Shot<'a> {
                 tangents: &d.tangents,
                 material,
                 mirrored: d.mirrored,
+                labels: labels.map_or(&[], |l| &l[i]),
             }
         };
         let look = &self.desc.look;
@@ -304,7 +361,8 @@ impl<'a> Shot<'a> {
             lights: lit.lights,
             style: lit.style,
             background: look.background,
-            objects: character.instances().iter().zip(deformed).map(object).collect(),
+            objects: character.instances().iter().zip(deformed).enumerate().map(object).collect(),
+            shapes: &self.shapes,
             materials: &self.materials,
             textures: &self.asset.textures,
         }

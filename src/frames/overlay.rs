@@ -156,7 +156,8 @@ impl Shot<'_> {
         self.pose(moment.time, worker, &mut stats);
         let camera = self.stand.camera(moment, &worker.posed, &worker.deformed);
 
-        worker.rasterizer.set_window(window);
+        worker.painter.set_window(window);
+        (worker.painter.renderer, worker.painter.outcome) = (self.desc.renderer, Default::default());
         let whole = overlays.onion.is_none() && overlays.xray.is_none();
         let background = self.desc.look.background;
         if whole && self.stage.is_none() {
@@ -185,6 +186,7 @@ impl Shot<'_> {
             trail.draw(self, moment.time, &camera, &worker.posed, [&mut layer, out], corner);
         }
         worker.layer = layer;
+        stats.rays = worker.painter.outcome;
         stats
     }
 
@@ -217,10 +219,10 @@ impl Shot<'_> {
         let start = Instant::now();
         let mut scene = self.scene(*camera, &worker.posed, &worker.deformed);
         scene.background = background;
-        let (rasterizer, effects) = (&mut worker.rasterizer, &mut worker.effects);
+        let (painter, effects) = (&mut worker.painter, &mut worker.effects);
         stats.raster += match &self.stage {
-            Some(stage) => stage.draw(&self.desc, &scene, rasterizer, effects, out),
-            None => rasterizer.draw_linear(&scene, &self.desc.settings, out),
+            Some(stage) => stage.draw(&self.desc, &scene, painter, effects, out),
+            None => painter.draw_linear(&scene, &self.desc.settings, out),
         };
         stats.times.draw += start.elapsed();
     }
@@ -237,7 +239,7 @@ impl Shot<'_> {
         let Some(figure) = &self.layers.figure else { return };
         let positions = figure.positions(self.asset.character.skeleton(), &worker.posed, self.center);
         let scene = figure.scene(self.scene(*camera, &worker.posed, &[]), &positions);
-        stats.raster += worker.rasterizer.draw_linear(&scene, &self.desc.settings, layer);
+        stats.raster += worker.painter.rasterizer.draw_linear(&scene, &self.desc.settings, layer);
         Operator::OVER.apply(layer, 1.0, out);
     }
 }

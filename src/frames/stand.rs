@@ -2,7 +2,7 @@
 
 use super::Moment;
 use super::fit::{self, Span};
-use super::framing::{Framing, orbit_axes};
+use super::framing::{Framing, Turns, orbit_axes};
 use super::view::{FramingDesc, Pivot, View, ViewError};
 use super::worker::Worker;
 use crate::asset::{Asset, MountedCamera};
@@ -77,6 +77,11 @@ impl<'a> Stand<'a> {
             }
         };
         Ok(Self { base, framing, axis, anchor, center })
+    }
+
+    /// A point of the axis that the camera walks around, if it does.
+    pub fn turns(&self) -> Option<Vec3> {
+        (self.framing.turns != Turns::None).then_some(self.axis)
     }
 
     /// The camera of a moment that poses the bones so and the meshes so.

@@ -6,7 +6,7 @@ use crate::character::{LastDeform, Scratch};
 use crate::fk::{self, Posed};
 use crate::image::Image;
 use crate::pose::Pose;
-use crate::render::raster::Rasterizer;
+use crate::render::Painter;
 use crate::skin::Deformed;
 use glam::DVec3;
 
@@ -20,7 +20,8 @@ pub struct Worker {
     /// What `deformed` was made by, and for which shot.
     last: Vec<LastDeform>,
     shot: u64,
-    pub(super) rasterizer: Rasterizer,
+    /// Draws; whoever wants to watch a picture by rays come along says so here.
+    pub painter: Painter,
     pub(super) effects: Effects,
     /// A picture on its way to 8 bits, and one that is put on it.
     pub(super) light: Image,

@@ -60,7 +60,7 @@ impl From<serde_json::Error> for LookError {
 }
 
 impl LookError {
-    fn value(place: impl Into<String>, why: impl Into<String>) -> Self {
+    pub(super) fn value(place: impl Into<String>, why: impl Into<String>) -> Self {
         Self::Value { place: place.into(), why: why.into() }
     }
 }
@@ -68,8 +68,9 @@ impl LookError {
 /// The file as written.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Document {
-    sinew_look: u32,
+pub(super) struct Document {
+    /// Not needed within a scene.
+    sinew_look: Option<u32>,
     background: Option<Background>,
     light: Option<Preset>,
     ambient: Option<Ambient>,
@@ -140,14 +141,16 @@ struct LampDoc {
     position: Option<[f32; 3]>,
     target: Option<[f32; 3]>,
     range: Option<f32>,
+    radius: Option<f32>,
+    radius_deg: Option<f32>,
     inner_deg: Option<f32>,
     outer_deg: Option<f32>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct MaterialDoc {
-    name: String,
+pub(super) struct MaterialDoc {
+    pub name: String,
     diffuse: Option<Color>,
     alpha: Option<f32>,
     specular: Option<Color>,
@@ -156,6 +159,10 @@ struct MaterialDoc {
     unlit: Option<bool>,
     double_sided: Option<bool>,
     textures: Option<bool>,
+    ambient: Option<Color>,
+    mirror: Option<Color>,
+    transmission: Option<Color>,
+    ior: Option<f32>,
 }
 
 /// Read a look.
@@ -181,8 +188,19 @@ struct MaterialDoc {
 pub fn from_bytes(bytes: &[u8]) -> Result<LookFile, LookError> {
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let doc: Document = serde_json::from_slice(text)?;
-    if doc.sinew_look != 1 {
-        return Err(LookError::Version { found: doc.sinew_look });
+    if doc.sinew_look.is_none() {
+        return Err(LookError::value(
+            "the look",
+            "missing field `sinew_look`: expected the format's version, 1",
+        ));
+    }
+    read(doc)
+}
+
+/// What a document says.
+pub(super) fn read(doc: Document) -> Result<LookFile, LookError> {
+    if let Some(found) = doc.sinew_look.filter(|v| *v != 1) {
+        return Err(LookError::Version { found });
     }
     let lighting = lighting(&doc)?;
     let background = doc.background.map(background).transpose()?;
@@ -245,12 +263,12 @@ fn lamp(place: &str, doc: &LampDoc) -> Result<Lamp, LookError> {
     };
     let kind = match doc.kind {
         Kind::Directional => {
-            only(place, "a directional lamp", doc, &["from"])?;
+            only(place, "a directional lamp", doc, &["from", "radius_deg"])?;
             let from = direction(place, "from", vector(place, "from", doc.from)?)?;
             LightKind::Directional { direction: -from }
         }
         Kind::Point => {
-            only(place, "a point lamp", doc, &["position", "range"])?;
+            only(place, "a point lamp", doc, &["position", "range", "radius"])?;
             let position = vector(place, "position", doc.position)?;
             LightKind::Point { position, falloff: falloff(place, doc)? }
         }
@@ -260,11 +278,18 @@ fn lamp(place: &str, doc: &LampDoc) -> Result<Lamp, LookError> {
         Some(FrameDoc::Camera) => LampFrame::Camera,
         _ => LampFrame::World,
     };
-    Ok(Lamp { light: Light { kind, color: color * intensity }, frame })
+    let radius = match doc.kind {
+        Kind::Directional => {
+            number(place, "radius_deg", doc.radius_deg.unwrap_or(0.0), 0.0, 45.0)?.to_radians()
+        }
+        _ => number(place, "radius", doc.radius.unwrap_or(0.0), 0.0, 1e6)?,
+    };
+    Ok(Lamp { light: Light { radius, ..Light::new(kind, color * intensity) }, frame })
 }
 
 fn spot(place: &str, doc: &LampDoc) -> Result<LightKind, LookError> {
-    only(place, "a spot lamp", doc, &["position", "target", "range", "inner_deg", "outer_deg"])?;
+    let fields = ["position", "target", "range", "inner_deg", "outer_deg", "radius"];
+    only(place, "a spot lamp", doc, &fields)?;
     let (position, target) = (vector(place, "position", doc.position)?, vector(place, "target", doc.target)?);
     let direction = direction(place, "target − position", target - position)?;
     let outer = number(place, "outer_deg", doc.outer_deg.unwrap_or(30.0), 0.1, 90.0)?;
@@ -289,6 +314,8 @@ fn only(place: &str, kind: &str, doc: &LampDoc, fields: &[&str]) -> Result<(), L
         ("position", doc.position.is_some()),
         ("target", doc.target.is_some()),
         ("range", doc.range.is_some()),
+        ("radius", doc.radius.is_some()),
+        ("radius_deg", doc.radius_deg.is_some()),
         ("inner_deg", doc.inner_deg.is_some()),
         ("outer_deg", doc.outer_deg.is_some()),
     ];
@@ -338,7 +365,7 @@ fn background(doc: Background) -> Result<[[f32; 4]; 2], LookError> {
     }
 }
 
-fn patch(i: usize, doc: &MaterialDoc) -> Result<MaterialPatch, LookError> {
+pub(super) fn patch(i: usize, doc: &MaterialDoc) -> Result<MaterialPatch, LookError> {
     let place = format!("materials[{i}] `{}`", doc.name);
     let color = |field: &str, c: &Option<Color>| {
         c.as_ref().map(|c| light(&format!("{place}.{field}"), c)).transpose()
@@ -363,5 +390,9 @@ fn patch(i: usize, doc: &MaterialDoc) -> Result<MaterialPatch, LookError> {
         unlit: doc.unlit,
         double_sided: doc.double_sided,
         textures: doc.textures,
+        ambient: color("ambient", &doc.ambient)?,
+        mirror: color("mirror", &doc.mirror)?,
+        transmission: color("transmission", &doc.transmission)?,
+        ior: doc.ior.map(|v| number(&place, "ior", v, 0.1, 10.0)).transpose()?,
     })
 }

@@ -16,8 +16,12 @@ pub mod picture;
 pub mod ply;
 #[cfg(feature = "io")]
 pub mod rig_json;
+#[cfg(feature = "io")]
+pub mod scene;
 #[cfg(all(feature = "io", feature = "pictures"))]
 pub mod sheet_json;
+#[cfg(feature = "io")]
+pub mod stl;
 
 use crate::asset::Asset;
 
@@ -67,7 +71,7 @@ pub struct PrimitiveSource {
 pub struct Import {
     /// What moves and how it looks.
     pub asset: Asset,
-    /// `glTF`, `sinew rig`, `notes rig`.
+    /// `glTF`, `sinew rig`, `notes rig`, `notes scene`, or `sinew scene of a …`.
     pub format: String,
     /// What the file says made it.
     pub generator: String,
@@ -77,6 +81,9 @@ pub struct Import {
     pub primitives: Vec<PrimitiveSource>,
     /// Extensions that the file names, sorted.
     pub extensions: Vec<String>,
+    /// What is around the character, or there instead of one, where the file is a scene.
+    #[cfg(feature = "io")]
+    pub setting: Option<scene::Setting>,
     /// Everything that was dropped or repaired.
     pub warnings: Vec<Warning>,
 }
@@ -100,6 +107,9 @@ pub enum ImportError {
     /// A rig of the notes.
     #[error(transparent)]
     Notes(#[from] notes::NotesError),
+    /// A scene.
+    #[error(transparent)]
+    Scene(#[from] scene::SceneError),
 }
 
 /// Read any file that the engine knows; the content decides, not the name.
@@ -108,6 +118,12 @@ pub enum ImportError {
 /// [`ImportError`]; the caller knows which file it named, the message says where in it.
 #[cfg(feature = "io")]
 pub fn import(path: &std::path::Path, options: &Options) -> Result<Import, ImportError> {
+    read_import(path, options, true)
+}
+
+/// [`import`], `scenes` among them or not.
+#[cfg(feature = "io")]
+fn read_import(path: &std::path::Path, options: &Options, scenes: bool) -> Result<Import, ImportError> {
     let bytes = read_file(path)?;
     let folder = path.parent().unwrap_or(std::path::Path::new(""));
     let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -118,6 +134,15 @@ pub fn import(path: &std::path::Path, options: &Options) -> Result<Import, Impor
             Ok(gltf::import_bytes(&bytes, Some(folder), &path.display().to_string(), options)?)
         }
         Format::Rig => Ok(rig_json::import(path, options)?),
+        Format::NotesScene | Format::Scene if !scenes => {
+            Err(ImportError::Unknown("this is a scene; expected a character: glTF or a rig".into()))
+        }
+        Format::NotesScene => {
+            let scene = scene::notes::from_bytes(&bytes, folder)?;
+            let setting = Some(scene::Setting::Notes(Box::new(scene)));
+            Ok(Import { format: "notes scene".into(), setting, ..Import::default() })
+        }
+        Format::Scene => Ok(scene::ours::import(&bytes, folder, options)?),
         Format::Unknown(why) => Err(ImportError::Unknown(why)),
     }
 }
@@ -136,6 +161,14 @@ pub fn read_file(path: &std::path::Path) -> std::io::Result<Vec<u8>> {
     Err(std::io::Error::other(format!("this is {what}; expected a file")))
 }
 
+/// A path beside a file; `None` for anything but a plain relative name.
+#[cfg(feature = "io")]
+fn beside(folder: &std::path::Path, name: &str) -> Option<std::path::PathBuf> {
+    let mut parts = std::path::Path::new(name).components();
+    let plain = !name.is_empty() && parts.all(|c| matches!(c, std::path::Component::Normal(_)));
+    plain.then(|| folder.join(name))
+}
+
 /// All bytes of a plain file that lies below `root`, wherever links on the way may lead.
 #[cfg(feature = "io")]
 fn read_below(root: &std::path::Path, path: &std::path::Path) -> std::io::Result<Vec<u8>> {
@@ -152,6 +185,8 @@ enum Format {
     Gltf,
     Rig,
     Notes,
+    NotesScene,
+    Scene,
     Unknown(String),
 }
 
@@ -167,6 +202,9 @@ fn probe(bytes: &[u8], name: &str) -> Format {
         asset: Option<IgnoredAny>,
         bones: Option<IgnoredAny>,
         model: Option<IgnoredAny>,
+        sinew_scene: Option<IgnoredAny>,
+        camera: Option<IgnoredAny>,
+        objects: Option<IgnoredAny>,
     }
 
     if bytes.starts_with(b"glTF") || name.to_ascii_lowercase().ends_with(".gltf") {
@@ -177,11 +215,14 @@ fn probe(bytes: &[u8], name: &str) -> Format {
         Ok(Keys { sinew_rig: Some(_), .. }) => Format::Rig,
         Ok(Keys { asset: Some(_), .. }) => Format::Gltf,
         Ok(Keys { bones: Some(_), model: Some(_), .. }) => Format::Notes,
+        Ok(Keys { sinew_scene: Some(_), .. }) => Format::Scene,
+        Ok(Keys { camera: Some(_), objects: Some(_), .. }) => Format::NotesScene,
         Ok(Keys { sinew_poses: Some(_), .. }) => Format::Unknown(
             "these are poses without a rig; name the rig, and these with --poses".into(),
         ),
         Ok(_) => Format::Unknown(
-            "a JSON file without `asset` (glTF), `sinew_rig` (a rig of ours) or `bones` and `model` (a rig of the notes)"
+            "a JSON file without `asset` (glTF), `sinew_rig` or `sinew_scene` (rigs and scenes of ours), `bones` and `model` (a rig of the notes) or \
+             `camera` and `objects` (a scene of the notes)"
                 .into(),
         ),
         Err(e) if text.first().is_some_and(|&b| b == b'{' || b.is_ascii_whitespace()) => {

@@ -182,11 +182,7 @@ pub fn import_bytes(bytes: &[u8], folder: &Path, _options: &Options) -> Result<I
 
 /// A path beside the rig; anything but a plain relative name is refused.
 fn beside(folder: &Path, field: &'static str, name: &str) -> Result<PathBuf, NotesError> {
-    let plain = Path::new(name).components().all(|c| matches!(c, std::path::Component::Normal(_)));
-    if plain && !name.is_empty() {
-        return Ok(folder.join(name));
-    }
-    Err(NotesError::Outside { field, name: name.into() })
+    super::beside(folder, name).ok_or_else(|| NotesError::Outside { field, name: name.into() })
 }
 
 fn rest_transforms(bones: &[Bone]) -> Result<Vec<DAffine3>, NotesError> {

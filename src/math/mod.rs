@@ -1,6 +1,7 @@
 //! Rotations, transforms and curves: the only arithmetic that every other room shares.
 
 pub mod euler;
+pub mod lanes;
 pub mod rotation;
 pub mod simd;
 pub mod spline;

@@ -16,16 +16,13 @@ pub struct F8(pub [f32; 8]);
 #[repr(C, align(32))]
 pub struct I8(pub [i32; 8]);
 
-/// Three times eight `f32`: points, directions or colours.
+/// Eight `f64`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct V8 {
-    /// First component.
-    pub x: F8,
-    /// Second component.
-    pub y: F8,
-    /// Third component.
-    pub z: F8,
-}
+#[repr(C, align(64))]
+pub struct D8(pub [f64; 8]);
+
+/// Three times eight `f32`: points, directions or colours.
+pub type V8 = super::lanes::V3<F8>;
 
 macro_rules! lanes {
     ($i:ident => $e:expr) => {{
@@ -58,6 +55,10 @@ lanewise!(F8, Add, add, a, b, a + b);
 lanewise!(F8, Sub, sub, a, b, a - b);
 lanewise!(F8, Mul, mul, a, b, a * b);
 lanewise!(F8, Div, div, a, b, a / b);
+lanewise!(D8, Add, add, a, b, a + b);
+lanewise!(D8, Sub, sub, a, b, a - b);
+lanewise!(D8, Mul, mul, a, b, a * b);
+lanewise!(D8, Div, div, a, b, a / b);
 lanewise!(I8, Add, add, a, b, a.wrapping_add(b));
 lanewise!(I8, Sub, sub, a, b, a.wrapping_sub(b));
 lanewise!(I8, Mul, mul, a, b, a.wrapping_mul(b));
@@ -69,6 +70,14 @@ impl Neg for F8 {
     #[inline(always)]
     fn neg(self) -> Self {
         Self(lanes!(i => -self.0[i]))
+    }
+}
+
+impl Neg for D8 {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(self.0.map(|x| -x))
     }
 }
 
@@ -285,81 +294,34 @@ impl I8 {
     }
 }
 
-impl V8 {
-    /// Zero.
-    pub const ZERO: Self = Self { x: F8::ZERO, y: F8::ZERO, z: F8::ZERO };
-
-    /// The same vector in every lane.
+impl D8 {
+    /// The smaller; `other` where either is NaN.
     #[inline(always)]
-    pub fn splat(v: glam::Vec3) -> Self {
-        Self { x: F8::splat(v.x), y: F8::splat(v.y), z: F8::splat(v.z) }
+    pub fn min(self, other: Self) -> Self {
+        Self(lanes!(i => if self.0[i] < other.0[i] { self.0[i] } else { other.0[i] }))
     }
 
-    /// Eight vectors.
+    /// The larger; `other` where either is NaN.
     #[inline(always)]
-    pub fn gather(v: [glam::Vec3; 8]) -> Self {
-        Self { x: F8(lanes!(i => v[i].x)), y: F8(lanes!(i => v[i].y)), z: F8(lanes!(i => v[i].z)) }
+    pub fn max(self, other: Self) -> Self {
+        Self(lanes!(i => if self.0[i] > other.0[i] { self.0[i] } else { other.0[i] }))
     }
 
-    /// Scalar product.
+    /// Square root.
     #[inline(always)]
-    pub fn dot(self, o: Self) -> F8 {
-        self.x * o.x + self.y * o.y + self.z * o.z
+    pub fn sqrt(self) -> Self {
+        Self(self.0.map(f64::sqrt))
     }
 
-    /// Vector product.
+    /// Mask of `self > other`.
     #[inline(always)]
-    pub fn cross(self, o: Self) -> Self {
-        Self {
-            x: self.y * o.z - self.z * o.y,
-            y: self.z * o.x - self.x * o.z,
-            z: self.x * o.y - self.y * o.x,
-        }
+    pub fn gt(self, other: Self) -> I8 {
+        I8(lanes!(i => -((self.0[i] > other.0[i]) as i32)))
     }
 
-    /// `v / ‖v‖`; lanes of no length stay zero.
-    #[inline(always)]
-    pub fn unit(self) -> Self {
-        let l2 = self.dot(self);
-        self * (F8::ONE / l2.max(F8::splat(1e-30)).sqrt())
-    }
-
-    /// `a` where the mask is set, else `b`.
-    #[inline(always)]
-    pub fn select(mask: I8, a: Self, b: Self) -> Self {
-        Self { x: mask.select(a.x, b.x), y: mask.select(a.y, b.y), z: mask.select(a.z, b.z) }
-    }
-}
-
-impl Add for V8 {
-    type Output = Self;
-    #[inline(always)]
-    fn add(self, o: Self) -> Self {
-        Self { x: self.x + o.x, y: self.y + o.y, z: self.z + o.z }
-    }
-}
-
-impl Sub for V8 {
-    type Output = Self;
-    #[inline(always)]
-    fn sub(self, o: Self) -> Self {
-        Self { x: self.x - o.x, y: self.y - o.y, z: self.z - o.z }
-    }
-}
-
-impl Mul for V8 {
-    type Output = Self;
-    #[inline(always)]
-    fn mul(self, o: Self) -> Self {
-        Self { x: self.x * o.x, y: self.y * o.y, z: self.z * o.z }
-    }
-}
-
-impl Mul<F8> for V8 {
-    type Output = Self;
-    #[inline(always)]
-    fn mul(self, k: F8) -> Self {
-        Self { x: self.x * k, y: self.y * k, z: self.z * k }
+    /// `xʸ`, as exact as the system's.
+    pub fn powf(self, y: Self) -> Self {
+        Self(lanes!(i => self.0[i].powf(y.0[i])))
     }
 }
 

@@ -98,6 +98,26 @@ pub(crate) fn present(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) ->
     }
 }
 
+/// Alpha of what has any, 0…1.
+#[inline(always)]
+pub(crate) fn alpha(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> F8 {
+    diffuse(&Maps::new(isa, scene, m, p), m, p).1.clamp01()
+}
+
+/// What is to be lit, and alpha as in [`light`]; what is unlit shines by itself.
+#[inline(always)]
+pub(crate) fn surface(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> (Surface<F8>, F8) {
+    let maps = &Maps::new(isa, scene, m, p);
+    let (k_d, alpha) = diffuse(maps, m, p);
+    let alpha = if m.alpha == AlphaMode::Blend { alpha.clamp01() } else { F8::ONE };
+    let surface = lit(maps, m, p, k_d);
+    if m.unlit {
+        let (ambient, diffuse, specular) = (V8::ZERO, V8::ZERO, V8::ZERO);
+        return (Surface { ambient, diffuse, specular, emissive: k_d, ..surface }, alpha);
+    }
+    (surface, alpha)
+}
+
 /// Linear light, and alpha: 1 unless the material blends. Not multiplied.
 #[inline(always)]
 pub(crate) fn light(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> (V8, F8) {
@@ -107,6 +127,16 @@ pub(crate) fn light(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> (
     if m.unlit {
         return (k_d, alpha);
     }
+    let surface = lit(maps, m, p, k_d);
+    if !scene.style.is_plain() {
+        return (styled::light(isa, &surface, scene, &[]), alpha);
+    }
+    (shade::blinn_phong(&surface, scene.ambient, &scene.lights), alpha)
+}
+
+/// What the textures make of the coefficients.
+#[inline(always)]
+fn lit(maps: &Maps, m: &Material, p: &impl Points, k_d: V8) -> Surface<F8> {
     let (specular, shininess) = highlight(maps, m);
     let mut emissive = V8::splat(m.emissive);
     if let Some(t) = maps.texel(&m.emissive_map) {
@@ -116,20 +146,17 @@ pub(crate) fn light(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> (
         Some(t) => (t[0] + -1.0) * m.occlusion_strength + 1.0,
         None => F8::ONE,
     };
-    let surface = Surface {
+    Surface {
         position: p.position(),
         normal: normal(maps, m, p),
         view: p.view(),
+        ambient: m.ambient.map_or(k_d, V8::splat),
         diffuse: k_d,
         specular,
         shininess,
         openness,
         emissive,
-    };
-    if !scene.style.is_plain() {
-        return (styled::light(isa, &surface, scene), alpha);
     }
-    (shade::blinn_phong(&surface, scene.ambient, &scene.lights), alpha)
 }
 
 /// `k_s` and `p`.

@@ -6,14 +6,21 @@ pub mod channel;
 pub mod footprint;
 mod material;
 pub mod outline;
+mod painter;
 mod sample;
 mod shade;
 pub mod shadow;
 mod styled;
+mod varying;
 
 // A loop that counts lanes is what becomes one vector instruction; iterators do not always.
 #[allow(clippy::needless_range_loop)]
 pub mod raster;
+
+#[allow(clippy::needless_range_loop)]
+pub mod ray;
+
+pub use painter::{Painter, Renderer, Watch};
 
 /// How a picture is made; what is on it is the [`Scene`](crate::scene::Scene).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -108,3 +115,19 @@ impl Default for Settings {
         Self { width: 512, height: 512, samples: 4, threads: 1 }
     }
 }
+
+/// Do every task, each on its own thread if there is more than one.
+fn each<T: Send>(tasks: Vec<T>, work: impl Fn(T) + Sync) {
+    if tasks.len() <= 1 {
+        return tasks.into_iter().for_each(work);
+    }
+    std::thread::scope(|s| {
+        for task in tasks {
+            s.spawn(|| work(task));
+        }
+    });
+}
+
+/// Samples of a pixel that has four, in 1/256 pixels from its centre: a rotated grid, so that near-horizontal and near-vertical edges
+/// both get four steps.
+pub(crate) const ROTATED: [[i32; 2]; 4] = [[-32, -96], [96, -32], [-96, 32], [32, 96]];

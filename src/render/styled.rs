@@ -7,15 +7,17 @@ use crate::math::simd::{self, F8, Isa, Kernel, V8};
 use crate::scene::{Light, Scene, ShadowMap};
 use glam::Vec3;
 
-/// `emissive + k_d·I_a(n)·openness + Σ` what the lamps add.
+/// `emissive + k_a·I_a(n)·openness + Σ` what the lamps add. `reached` is the share of each lamp's light that arrives; where it
+/// says nothing, the scene's map does.
 #[inline(never)]
-pub(crate) fn light(isa: Isa, surface: &Surface, scene: &Scene) -> V8 {
-    simd::run(isa, Styled { surface, scene })
+pub(crate) fn light(isa: Isa, surface: &Surface<F8>, scene: &Scene, reached: &[V8]) -> V8 {
+    simd::run(isa, Styled { surface, scene, reached })
 }
 
 struct Styled<'a> {
-    surface: &'a Surface,
+    surface: &'a Surface<F8>,
     scene: &'a Scene<'a>,
+    reached: &'a [V8],
 }
 
 impl Kernel for Styled<'_> {
@@ -23,7 +25,7 @@ impl Kernel for Styled<'_> {
 
     #[inline(always)]
     fn run(self) -> V8 {
-        let (s, scene) = (self.surface, self.scene);
+        let Self { surface: s, scene, reached } = self;
         let above = V8::splat(scene.ambient);
         let ambient = match scene.style.below {
             Some(below) => {
@@ -32,25 +34,22 @@ impl Kernel for Styled<'_> {
             }
             None => above,
         };
-        let base = s.emissive + s.diffuse * ambient * s.openness;
+        let base = shade::unlit(s, ambient);
         match scene.style.toon {
-            Some(steps) => base + toon(s, scene, steps),
-            None => base + smooth(s, scene),
+            Some(steps) => base + toon(s, scene, reached, steps),
+            None => base + smooth(s, scene, reached),
         }
     }
 }
 
 /// `Σ I·reflected`, the key light where it arrives.
 #[inline(always)]
-fn smooth(s: &Surface, scene: &Scene) -> V8 {
+fn smooth(s: &Surface<F8>, scene: &Scene, reached: &[V8]) -> V8 {
     let mut sum = V8::ZERO;
     for (i, light) in scene.lights.iter().enumerate() {
-        let a = shade::arrival(light, s.position);
-        let mut r = shade::reflected(s, a.towards);
-        if i == 0 {
-            r = r * reach(s, scene, a.towards);
-        }
-        sum = sum + a.intensity * r;
+        let a = shade::arrival(&light.into(), s.position);
+        sum = sum
+            + a.intensity * (shade::reflected(s, a.towards, true) * reach(s, scene, reached, i, a.towards));
     }
     sum
 }
@@ -60,20 +59,17 @@ const LIFT: f32 = 0.25;
 
 /// The diffuse term in steps, and highlights with an edge (see [`crate::scene::Style::toon`]).
 #[inline(always)]
-fn toon(s: &Surface, scene: &Scene, steps: u32) -> V8 {
+fn toon(s: &Surface<F8>, scene: &Scene, reached: &[V8], steps: u32) -> V8 {
     let (mut irradiance, mut highlight) = (V8::ZERO, V8::ZERO);
     for (i, light) in scene.lights.iter().enumerate() {
-        let a = shade::arrival(light, s.position);
-        let mut n_l = s.normal.dot(a.towards).max(F8::ZERO);
-        if i == 0 {
-            n_l = n_l * reach(s, scene, a.towards);
-        }
+        let a = shade::arrival(&light.into(), s.position);
+        let n_l = reach(s, scene, reached, i, a.towards) * s.normal.dot(a.towards).max(F8::ZERO);
         irradiance = irradiance + a.intensity * n_l;
         if i > 0 {
             continue;
         }
         let n_h = s.normal.dot((s.view + a.towards).unit()).max(F8::ZERO).min(F8::ONE);
-        let bright = simd::pow(n_h, s.shininess).gt(F8::splat(0.5)) & n_l.gt(F8::ZERO);
+        let bright = simd::pow(n_h, s.shininess).gt(F8::splat(0.5)) & n_l.y.gt(F8::ZERO);
         highlight = V8::select(bright, a.intensity * s.specular, V8::ZERO);
     }
     let key = brightest(&scene.lights);
@@ -96,12 +92,16 @@ fn brightest(lights: &[Light]) -> Vec3 {
     best
 }
 
-/// The share of the key light that arrives, 0…1.
+/// The share of a lamp's light that arrives, 0…1.
 #[inline(always)]
-fn reach(s: &Surface, scene: &Scene, towards: V8) -> F8 {
-    match scene.style.shadow {
-        Some(map) => unshadowed(map, s.position, s.normal.dot(towards)),
-        None => F8::ONE,
+fn reach(s: &Surface<F8>, scene: &Scene, reached: &[V8], lamp: usize, towards: V8) -> V8 {
+    match (reached.get(lamp), scene.style.shadow) {
+        (Some(share), _) => *share,
+        (None, Some(map)) if lamp == 0 => {
+            let share = unshadowed(map, s.position, s.normal.dot(towards));
+            V8 { x: share, y: share, z: share }
+        }
+        _ => V8::splat(Vec3::ONE),
     }
 }
 

@@ -40,9 +40,17 @@ pub struct Light {
     pub kind: LightKind,
     /// `I`: linear RGB.
     pub color: Vec3,
+    /// Half its size, for soft shadows: metres for a point or spot, radians as seen from the scene for a directional light; 0
+    /// throws hard ones. Nothing else depends on it.
+    pub radius: f32,
 }
 
 impl Light {
+    /// One without size.
+    pub fn new(kind: LightKind, color: Vec3) -> Self {
+        Self { kind, color, radius: 0.0 }
+    }
+
     /// The lamp carried from one frame into another. Directions keep unit length; one without length points along −z.
     pub fn carried(&self, frame: &Affine3A) -> Self {
         let turn = |d: Vec3| frame.transform_vector3(d).normalize_or(Vec3::NEG_Z);

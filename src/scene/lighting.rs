@@ -38,7 +38,7 @@ impl Lamp {
     /// A lamp infinitely far away in the direction `from`.
     pub fn directional(from: Vec3, color: Vec3, frame: LampFrame) -> Self {
         let direction = -from.normalize_or(Vec3::Y);
-        Self { light: Light { kind: LightKind::Directional { direction }, color }, frame }
+        Self { light: Light::new(LightKind::Directional { direction }, color), frame }
     }
 }
 

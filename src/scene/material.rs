@@ -59,6 +59,15 @@ pub struct Material {
     pub double_sided: bool,
     /// `L = k_d` alone, no light needed.
     pub unlit: bool,
+    /// `k_a`, instead of `k_d` in the ambient term.
+    pub ambient: Option<Vec3>,
+    /// `k_m`: the share of the light from the mirrored direction that is added. Rays alone see it.
+    pub mirror: Vec3,
+    /// The share of the light that is left when it passes through: glass, if not zero. What arrives at the surface then divides by
+    /// Fresnel's equations into mirrored and refracted light. Rays alone see it.
+    pub transmission: Vec3,
+    /// Refractive index of what lies behind the surface; 1 before it.
+    pub ior: f32,
 }
 
 impl Default for Material {
@@ -80,6 +89,10 @@ impl Default for Material {
             alpha: AlphaMode::Opaque,
             double_sided: false,
             unlit: false,
+            ambient: None,
+            mirror: Vec3::ZERO,
+            transmission: Vec3::ZERO,
+            ior: 1.5,
         }
     }
 }

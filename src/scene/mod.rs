@@ -7,6 +7,7 @@ mod material;
 mod mips;
 mod patch;
 mod shadow;
+mod shape;
 mod style;
 pub(crate) mod texels;
 mod texture;
@@ -17,6 +18,7 @@ pub use lighting::{Lamp, LampFrame, Lighting};
 pub use material::{AlphaMode, Material, TextureRef};
 pub use patch::MaterialPatch;
 pub use shadow::ShadowMap;
+pub use shape::{Geometry, Pinhole, Shape, ShapeLight, ShapeMaterial, ShapeScene, Soup, Source};
 pub use style::Style;
 pub use texture::{Content, Filter, Texture, TextureError, TextureId, WrapMode};
 
@@ -38,6 +40,17 @@ pub struct Object<'a> {
     pub material: usize,
     /// Triangles wind the other way round (a mirroring transform).
     pub mirrored: bool,
+    /// Numbers that tell parts of the surface apart, 0 for none: one a vertex, one for all of them, or an empty list. What they mean is
+    /// for the scene's maker to say; only channels show them.
+    pub labels: &'a [u32],
+}
+
+impl Object<'_> {
+    /// The label of a vertex.
+    pub fn label(&self, vertex: u32) -> u32 {
+        let only = if self.labels.len() == 1 { 0 } else { vertex as usize };
+        self.labels.get(only).copied().unwrap_or(0)
+    }
 }
 
 /// Everything that a renderer reads.
@@ -55,6 +68,8 @@ pub struct Scene<'a> {
     pub background: [f32; 4],
     /// Surfaces.
     pub objects: Vec<Object<'a>>,
+    /// Surfaces without a mesh: rays meet them, the rasterizer does not draw them.
+    pub shapes: &'a [Shape],
     /// What surfaces are made of.
     pub materials: &'a [Material],
     /// What materials refer to.

@@ -24,6 +24,14 @@ pub struct MaterialPatch {
     pub double_sided: Option<bool>,
     /// `false` takes all textures away.
     pub textures: Option<bool>,
+    /// `k_a`.
+    pub ambient: Option<Vec3>,
+    /// `k_m`.
+    pub mirror: Option<Vec3>,
+    /// Of glass.
+    pub transmission: Option<Vec3>,
+    /// Refractive index.
+    pub ior: Option<f32>,
 }
 
 impl MaterialPatch {
@@ -76,6 +84,10 @@ impl MaterialPatch {
         m.emissive = self.emissive.unwrap_or(m.emissive);
         m.unlit = self.unlit.unwrap_or(m.unlit);
         m.double_sided = self.double_sided.unwrap_or(m.double_sided);
+        m.ambient = self.ambient.or(m.ambient);
+        m.mirror = self.mirror.unwrap_or(m.mirror);
+        m.transmission = self.transmission.unwrap_or(m.transmission);
+        m.ior = self.ior.unwrap_or(m.ior);
     }
 }
 

@@ -16,6 +16,9 @@ pub struct Style<'a> {
     pub toon: Option<u32>,
     /// What the key light, `Scene::lights[0]`, does not reach.
     pub shadow: Option<&'a ShadowMap>,
+    /// What mirrored and refracted rays see where they meet nothing, linear RGB: straight above and straight below, mixed in between;
+    /// the scene's background for `None`.
+    pub sky: Option<[Vec3; 2]>,
 }
 
 impl Style<'_> {

@@ -47,11 +47,10 @@ fn main() {
             tangents: &[],
             material: 0,
             mirrored: false,
+            labels: &[],
         };
-        let light = Light {
-            kind: LightKind::Point { position: Vec3::new(3.0, 5.0, 4.0), falloff: None },
-            color: Vec3::ONE,
-        };
+        let light =
+            Light::new(LightKind::Point { position: Vec3::new(3.0, 5.0, 4.0), falloff: None }, Vec3::ONE);
         let scene = Scene {
             camera,
             ambient: Vec3::splat(0.05),
@@ -59,6 +58,7 @@ fn main() {
             style: Style::default(),
             background: [0.0; 4],
             objects: vec![object],
+            shapes: &[],
             materials: &material,
             textures: &[],
         };

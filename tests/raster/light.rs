@@ -5,7 +5,7 @@ use glam::DVec3;
 use sinew::scene::LightKind;
 
 fn point(position: Vec3, falloff: Option<f32>) -> Light {
-    Light { kind: LightKind::Point { position, falloff }, color: Vec3::ONE }
+    Light::new(LightKind::Point { position, falloff }, Vec3::ONE)
 }
 
 /// A lit square seen from two metres; the middle pixel of three shows the origin.
@@ -44,7 +44,7 @@ fn a_lit_plane_has_the_values_of_the_formula() {
     };
     near(middle(&plate(vec![point(Vec3::new(1.0, 0.0, 1.0), None)])), want(1.0));
     let direction = Vec3::new(-1.0, 0.0, -1.0).normalize();
-    let sun = Light { kind: LightKind::Directional { direction }, color: Vec3::ONE };
+    let sun = Light::new(LightKind::Directional { direction }, Vec3::ONE);
     near(middle(&plate(vec![sun])), want(1.0));
     near(middle(&plate(vec![sun, sun])), {
         let (one, none) = (want(1.0), want(0.0));
@@ -63,7 +63,7 @@ fn a_lit_plane_has_the_values_of_the_formula() {
         cos_inner: cos + 0.1,
         cos_outer: cos - 0.1,
     };
-    near(middle(&plate(vec![Light { kind, color: Vec3::ONE }])), want(0.25));
+    near(middle(&plate(vec![Light::new(kind, Vec3::ONE)])), want(0.25));
 }
 
 #[test]
@@ -103,8 +103,7 @@ fn a_plate_with_a_spheres_normals_shades_like_the_sphere() {
     let direction = -DVec3::new(0.5, 0.7, 0.6).normalize();
     let mut stage = Stage::of(from_front(5.0, 1.2), Mesh::new(data).unwrap(), Material::default());
     stage.materials[0].specular = Vec3::splat(0.5);
-    stage.lights =
-        vec![Light { kind: LightKind::Directional { direction: direction.as_vec3() }, color: Vec3::ONE }];
+    stage.lights = vec![Light::new(LightKind::Directional { direction: direction.as_vec3() }, Vec3::ONE)];
     let (picture, _) = stage.linear(200, 1);
     for (k, p) in picture.pixels.iter().enumerate() {
         let at = |i: usize| (i as f64 + 0.5) / 200.0 * 1.2 - 0.6;
@@ -238,10 +237,10 @@ fn creases_and_flat_faces_keep_a_colour_for_each_side() {
         ..Default::default()
     };
     for normals in [true, false] {
-        let sun = Light {
-            kind: LightKind::Directional { direction: Vec3::new(1.0, 0.0, -1.0).normalize() },
-            color: Vec3::ONE,
-        };
+        let sun = Light::new(
+            LightKind::Directional { direction: Vec3::new(1.0, 0.0, -1.0).normalize() },
+            Vec3::ONE,
+        );
         let mut stage = plate(vec![sun]);
         stage.materials[0].specular = Vec3::ZERO;
         stage.camera = from_front(5.0, 2.0);

@@ -77,6 +77,7 @@ impl Stage {
                 tangents: &mesh.tangents,
                 material: *material,
                 mirrored: false,
+                labels: &[],
             });
         }
         Scene {
@@ -86,6 +87,7 @@ impl Stage {
             style: Style::default(),
             background: self.background,
             objects,
+            shapes: &[],
             materials: &self.materials,
             textures: &self.textures,
         }

@@ -44,11 +44,8 @@ fn jumble(seed: u64) -> Stage {
     }
     stage.ambient = Vec3::splat(0.2);
     stage.lights = vec![
-        Light {
-            kind: LightKind::Point { position: Vec3::ONE * 2.0, falloff: Some(9.0) },
-            color: Vec3::splat(8.0),
-        },
-        Light { kind: LightKind::Directional { direction: Vec3::NEG_Y }, color: Vec3::X },
+        Light::new(LightKind::Point { position: Vec3::ONE * 2.0, falloff: Some(9.0) }, Vec3::splat(8.0)),
+        Light::new(LightKind::Directional { direction: Vec3::NEG_Y }, Vec3::X),
     ];
     stage
 }

@@ -142,7 +142,7 @@ fn a_normal_map_tilts_with_or_without_tangents() {
     let direction = Vec3::new(-1.0, 0.0, -1.0).normalize();
     let mut stage = Stage::of(from_front(5.0, 2.0), Mesh::new(data.clone()).unwrap(), m);
     stage.textures.push(map);
-    stage.lights = vec![Light { kind: sinew::scene::LightKind::Directional { direction }, color: Vec3::ONE }];
+    stage.lights = vec![Light::new(sinew::scene::LightKind::Directional { direction }, Vec3::ONE)];
     let without = stage.linear(4, 1).0.pixels[5][0];
     data.tangents = vec![Vec4::new(1.0, 0.0, 0.0, -1.0); 4];
     stage.meshes[0].0 = Mesh::new(data).unwrap();

@@ -75,7 +75,7 @@ impl<'a> Batch<'a> {
             clip: "clip",
             index: 0,
         }))?;
-        args.sheet.settings(args.output.settings()?)?;
+        args.sheet.settings(args.output.settings(None, args.renderer.coverage())?)?;
         if args.inputs.len() > 1 && !template.tells_inputs() {
             let message = "-o: several inputs need {name} (or {folder}) in the output's name";
             return Err(Failure::Usage(message.into()));
@@ -166,6 +166,7 @@ impl<'a> Batch<'a> {
         let path = target.path_of(1).filter(|p| self.args.batch.skip_existing && p.exists());
         if let Some(path) = path
             && self.args.sheet.companions(&target).iter().all(|p| p.exists())
+            && self.args.channels.files(&target, 1).iter().all(|p| p.exists())
             && self.args.batch.manifest.is_none()
             && !self.args.batch.dry_run
         {
@@ -203,7 +204,8 @@ impl<'a> Batch<'a> {
         let all = plan.frames.clone();
         let skip = self.args.batch.skip_existing;
         let skip = skip && companions.iter().all(|p| p.exists());
-        let there = |f: &Frame| skip && target.path_of(f.number).is_some_and(|p| p.exists());
+        let complete = |f: &Frame| self.args.channels.files(&target, f.number).iter().all(|p| p.exists());
+        let there = |f: &Frame| skip && target.path_of(f.number).is_some_and(|p| p.exists()) && complete(f);
         plan.frames.retain(|f| !there(f));
         if self.args.batch.dry_run {
             return announce(&task, &plan, all.len(), &companions);
@@ -328,7 +330,8 @@ impl<'a> Batch<'a> {
             frames.push(FrameEntry { frame: f.number, seconds: f.moment.time, file, sha256 });
         }
         let film = task.target.path_of(1).filter(|_| !single);
-        let companions = self.args.sheet.companions(task.target);
+        let mut companions = self.args.sheet.companions(task.target);
+        companions.extend(all.iter().flat_map(|f| self.args.channels.files(task.target, f.number)));
         let beside: Vec<_> =
             companions.into_iter().map(|file| Ok(FileEntry { sha256: hash(&file)?, file })).collect();
         self.manifest.outputs.push(Output {

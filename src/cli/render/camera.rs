@@ -5,6 +5,7 @@ use crate::cli::Failure;
 use glam::DVec3;
 use sinew::asset::Asset;
 use sinew::frames::{FramingDesc, Pivot, Turns, View};
+use sinew::io::scene::ours::{self, SceneFile};
 use sinew::render::Window;
 
 /// Height of the film that `focal` speaks of, millimetres: still photography's 36 × 24.
@@ -28,7 +29,7 @@ pub struct CameraArgs {
     camera: String,
     /// Stand here, in world metres; --camera then gives fov, focal, ortho or roll alone.
     #[arg(long, value_name = "X,Y,Z", requires = "look_at", allow_hyphen_values = true, value_parser = parse_point)]
-    eye: Option<DVec3>,
+    pub eye: Option<DVec3>,
     /// Look here, in world metres.
     #[arg(long, value_name = "X,Y,Z", requires = "eye", allow_hyphen_values = true, value_parser = parse_point)]
     look_at: Option<DVec3>,
@@ -65,8 +66,14 @@ struct Orbit {
 }
 
 impl CameraArgs {
-    /// Which camera films.
-    pub fn view(&self, asset: &Asset) -> Result<View, Failure> {
+    /// Which camera films: the scene's, unless options name one.
+    pub fn view(&self, asset: &Asset, scene: Option<&SceneFile>) -> Result<View, Failure> {
+        if let Some(view) = scene.and_then(|s| s.camera).filter(|_| self.is_default() && self.eye.is_none()) {
+            return Ok(match view {
+                ours::View::LookAt { eye, target, up, fov_y } => View::LookAt { eye, target, up, fov_y },
+                ours::View::Orbit { yaw, pitch, fov_y } => View::Orbit { yaw, pitch, fov_y },
+            });
+        }
         if let Some(camera) = self.mounted(asset) {
             return match (&self.follow, self.eye) {
                 (None, None) => Ok(View::Mounted(camera)),

@@ -1,5 +1,7 @@
 //! Frames into files: drawn and encoded by workers, written in order.
 
+use super::channels::Beside;
+use super::renderer;
 use super::sheet::Painter;
 use super::time::Frame;
 use crate::cli::{Failure, say::Say};
@@ -8,8 +10,9 @@ use sinew::image::{Image, Rgba8};
 use sinew::io::manifest::sha256;
 use sinew::io::picture::{
     self, AtomicFile, Coding, Dither, ExrDepth, Film, FilmWriter, Folder, Format, FrameEncoder, Output,
-    Palette, PngLevel, Target, choose_dither, encode_exr, encode_png, encode_webp,
+    Palette, PngLevel, Target, choose_dither, encode_exr_layers, encode_png, encode_webp,
 };
+use sinew::render::channel::Channels;
 use sinew::time::Rate;
 use std::io::Write;
 use std::path::Path;
@@ -31,6 +34,12 @@ pub struct Job<'a> {
     pub force: bool,
     /// Compute hashes.
     pub hash: bool,
+    /// What is written beside each picture.
+    pub beside: Beside,
+    /// How long rays may draw a picture.
+    pub budget: Option<Duration>,
+    /// Shows how far one picture is.
+    pub bar: indicatif::ProgressBar,
     /// Frames become pixel art; they are drawn before nothing then.
     pub art: Option<Painter>,
     /// Pixels of a finished frame for each one that is drawn, across and down.
@@ -40,9 +49,16 @@ pub struct Job<'a> {
 }
 
 impl Job<'_> {
+    /// Let a worker's next picture take its time and show how far it is.
+    fn follow(&self, worker: &mut Worker) {
+        let rays = self.shot.desc().renderer.rays();
+        worker.painter.watch = rays.map(|_| renderer::watch(self.budget, self.bar.clone()));
+    }
+
     /// Draw a moment of a sheet, and count what it cost.
     pub fn draw(&self, moment: Moment, worker: &mut Worker) -> Rgba8 {
         let mut picture = Rgba8::default();
+        self.follow(worker);
         let stats = self.shot.draw(moment, worker, &mut picture);
         self.count(stats);
         picture
@@ -93,11 +109,14 @@ pub fn write(job: &Job, say: &Say) -> Result<Written, Failure> {
             let message = "--pixel-art: OpenEXR has no palette; expected a name that ends in .png, .webp, .gif or .apng";
             return Err(Failure::Usage(message.into()));
         }
-        Format::Exr => stills(job, say, shoot_linear, |p| encode_exr(p, ExrDepth::Float)),
-        Format::Webp => stills(job, say, shoot, encode_webp),
+        Format::Exr => {
+            let layers = |seen: &Channels| job.beside.layers(seen);
+            stills(job, say, shoot_linear, |p, seen| encode_exr_layers(p, ExrDepth::Float, &layers(seen)))
+        }
+        Format::Webp => stills(job, say, shoot, |p, _| encode_webp(p)),
         _ => match &job.art {
-            Some(art) => stills(job, say, shoot, |p| art.encode_png(p, job.level)),
-            None => stills(job, say, shoot, |p| encode_png(p, job.level)),
+            Some(art) => stills(job, say, shoot, |p, _| art.encode_png(p, job.level)),
+            None => stills(job, say, shoot, |p, _| encode_png(p, job.level)),
         },
     };
     let written = match drawn {
@@ -137,7 +156,8 @@ fn refuse_existing(job: &Job) -> Result<(), Failure> {
     }
     for frame in job.frames {
         let Some(path) = job.target.path_of(frame.number) else { continue };
-        if path.exists() {
+        let beside = job.beside.files(&path);
+        if let Some(path) = [path].iter().chain(&beside).find(|p| p.exists()) {
             let message = format!("{}: the file exists; --force overwrites it", path.display());
             return Err(Failure::Run(message));
         }
@@ -150,6 +170,7 @@ type Shoot<P> = fn(&Job, Moment, &mut Worker, &mut P) -> FrameStats;
 
 /// As it is shown: painted, where there is pixel art.
 fn shoot(job: &Job, moment: Moment, worker: &mut Worker, out: &mut Rgba8) -> FrameStats {
+    job.follow(worker);
     let stats = job.shot.draw(moment, worker, out);
     if let Some(art) = &job.art {
         *out = art.paint(out);
@@ -158,6 +179,7 @@ fn shoot(job: &Job, moment: Moment, worker: &mut Worker, out: &mut Rgba8) -> Fra
 }
 
 fn shoot_linear(job: &Job, moment: Moment, worker: &mut Worker, out: &mut Image) -> FrameStats {
+    job.follow(worker);
     job.shot.draw_linear(moment, worker, out)
 }
 
@@ -218,34 +240,46 @@ fn stills<P: Default>(
     job: &Job,
     say: &Say,
     shoot: Shoot<P>,
-    encode: impl Fn(&P) -> Result<Vec<u8>, picture::Error> + Sync,
+    encode: impl Fn(&P, &Channels) -> Result<Vec<u8>, picture::Error> + Sync,
 ) -> Result<Written, Fault> {
+    let wanted = job.beside.wanted();
     let folder = if matches!(job.target, Target::Sequence(..)) { Folder::Create } else { Folder::MustExist };
     let bar = say.progress(job.frames.len());
-    let still = |(worker, picture): &mut (Worker, P), i: usize| -> Result<Still, picture::Error> {
-        let stats = shoot(job, job.frames[i].moment, worker, picture);
+    let still = |(worker, picture, seen): &mut (Worker, P, Channels), i: usize| {
+        let mut stats = shoot(job, job.frames[i].moment, worker, picture);
+        if !wanted.is_empty() {
+            stats += job.shot.draw_channels(job.frames[i].moment, worker, &wanted, seen);
+        }
         let start = Instant::now();
-        let bytes = encode(picture)?;
+        let bytes = encode(picture, seen)?;
+        let beside = job.beside.encode_all(job.target.format(), seen)?;
         let hash = job.hash.then(|| sha256(&bytes));
-        let mut still = Still { stats, hash, size: bytes.len(), encode: start.elapsed(), ..Still::default() };
+        let size = bytes.len() + beside.iter().map(|b| b.1.len()).sum::<usize>();
+        let mut still = Still { stats, hash, size, encode: start.elapsed(), ..Still::default() };
         let start = Instant::now();
         match job.target.path_of(job.frames[i].number) {
-            Some(path) => AtomicFile::write(path, &bytes, job.force, folder)?,
+            Some(path) => {
+                for (name, bytes) in &beside {
+                    AtomicFile::write(name.file(&path), bytes, job.force, folder)?;
+                }
+                AtomicFile::write(path, &bytes, job.force, folder)?;
+            }
             None => still.bytes = bytes,
         }
         still.write = start.elapsed();
         Ok(still)
     };
     let (mut written, mut fault) = (Written::default(), None);
-    let state = || (Worker::default(), P::default());
-    let done = in_order(job.frames.len(), job.threads, state, still, |_, result| {
-        let received = result.and_then(|s| written.add(s));
-        bar.inc(1);
-        received.map_err(|e| {
-            fault = Some(e);
-            Stop
-        })
-    });
+    let state = || (Worker::default(), P::default(), Channels::default());
+    let done =
+        in_order(job.frames.len(), job.threads, state, still, |_, result: Result<Still, picture::Error>| {
+            let received = result.and_then(|s| written.add(s));
+            bar.inc(1);
+            received.map_err(|e| {
+                fault = Some(e);
+                Stop
+            })
+        });
     bar.finish_and_clear();
     ended(done, fault, written)
 }

@@ -39,7 +39,7 @@ pub struct LookArgs {
     #[arg(long, num_args = 0..=1, default_missing_value = "shadow", value_name = "shadow|#rrggbb", value_parser = parse_ground)]
     ground: Option<GroundLook>,
     /// none, contact (soft, below what is near the ground), or map (thrown by the key light, on the character too); contact where there is a
-    /// ground. Contact brings a ground along.
+    /// ground. Contact brings a ground along. Rays throw all lamps' shadows, on shapes and character, unless it is none.
     #[arg(long, value_name = "MODE", value_parser = parse_shadow)]
     shadow: Option<Shadows>,
     /// Stops by which light is made brighter, or darker below 0; -16 to 16.
@@ -72,9 +72,30 @@ impl LookArgs {
         self.background.is_some()
     }
 
-    /// What the options say, for an asset; `warn` is told what has no effect on it.
-    pub fn look(&self, asset: &Asset, warn: impl Fn(&str)) -> Result<Look, Failure> {
-        let file = self.look.as_ref().map(|p| read(p)).transpose()?.unwrap_or_default();
+    /// Whether anything is asked for but a grade.
+    pub fn is_some(&self) -> bool {
+        let files = self.look.is_some() || self.light.is_some() || self.background.is_some();
+        files || self.ground.is_some() || self.outline.is_some() || self.shading != Shading::Smooth
+    }
+
+    /// Whether shadows were not refused.
+    pub fn has_shadows(&self) -> bool {
+        self.shadow != Some(Shadows::None)
+    }
+
+    /// How light becomes 8 bits.
+    pub fn grade(&self) -> Grade {
+        Grade { exposure_stops: self.exposure, tone: self.tone, transfer: self.gamma, dither: self.dither }
+    }
+
+    /// What the options or else the scene say, for an asset; `warn` is told what has no effect on it.
+    pub fn look(
+        &self,
+        asset: &Asset,
+        scene: Option<&LookFile>,
+        warn: impl Fn(&str),
+    ) -> Result<Look, Failure> {
+        let file = self.look.as_ref().map(|p| read(p)).transpose()?.or(scene.cloned()).unwrap_or_default();
         for patch in &file.materials {
             if !asset.materials.iter().any(|m| patch.matches(&m.name)) {
                 let names: Vec<&str> = asset.materials.iter().map(|m| m.name.as_str()).collect();
@@ -98,12 +119,7 @@ impl LookArgs {
             ground,
             shadows: self.shadow.unwrap_or(usual),
             materials: file.materials,
-            grade: Grade {
-                exposure_stops: self.exposure,
-                tone: self.tone,
-                transfer: self.gamma,
-                dither: self.dither,
-            },
+            grade: self.grade(),
         })
     }
 

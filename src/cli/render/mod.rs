@@ -3,21 +3,26 @@
 mod batch;
 mod bone;
 mod camera;
+mod channels;
 mod film;
 mod look;
 mod output;
 mod overlay;
+mod renderer;
+mod shapes;
 mod sheet;
 mod stats;
 mod time;
 
 use super::{Failure, print, say, say::Say};
+use channels::Beside;
 use film::{Job, Written};
 use sinew::asset::Asset;
-use sinew::frames::{Look, Shot, ShotDesc};
+use sinew::frames::{Look, Props, Shot, ShotDesc};
 use sinew::io::Import;
 use sinew::io::picture::{Format, Target};
-use sinew::render::Settings;
+use sinew::io::scene::{Setting, ours::SceneFile};
+use sinew::render::{Renderer, Settings};
 use sinew::time::Range;
 use stats::Totals;
 use std::path::{Path, PathBuf};
@@ -47,7 +52,7 @@ seen over the whole clip, unless --camera names one of the asset's. An existing 
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// glTF files (.gltf, .glb) or rigs (.json).
+    /// glTF files (.gltf, .glb), rigs or scenes (.json).
     #[arg(required = true, value_name = "INPUT")]
     inputs: Vec<PathBuf>,
     /// Show the clips and cameras of the input and stop.
@@ -63,6 +68,10 @@ pub struct Args {
     look: look::LookArgs,
     #[command(flatten)]
     overlay: overlay::OverlayArgs,
+    #[command(flatten)]
+    renderer: renderer::RendererArgs,
+    #[command(flatten)]
+    channels: channels::ChannelArgs,
     #[command(flatten)]
     sheet: sheet::SheetArgs,
     #[command(flatten)]
@@ -86,6 +95,27 @@ struct Task<'a> {
     target: &'a Target,
 }
 
+/// The scene of ours that an input is.
+fn scene(import: &Import) -> Option<&SceneFile> {
+    match &import.setting {
+        Some(Setting::Ours(scene)) => Some(scene),
+        _ => None,
+    }
+}
+
+fn props(scene: &SceneFile) -> Props {
+    Props { shapes: scene.shapes.clone(), materials: scene.materials.clone() }
+}
+
+/// Pixels of a picture where no option says.
+fn usual_size(import: &Import) -> Option<[usize; 2]> {
+    match &import.setting {
+        Some(Setting::Ours(scene)) => scene.size,
+        Some(Setting::Notes(scene)) => Some(shapes::usual_size(scene)),
+        None => None,
+    }
+}
+
 /// Which pictures an output consists of.
 struct Plan {
     frames: Vec<Frame>,
@@ -97,22 +127,32 @@ fn plan(args: &Args, task: &Task) -> Result<Plan, Failure> {
     let range = task.clip.map_or(Range::default(), |c| clips[c].playback());
     let one_picture = args.sheet.is_one_picture();
     let alone = !task.target.takes_a_clip() && !one_picture;
-    let frames = args.time.frames(task.input, range, alone, args.camera.turntable)?;
+    let at = scene(task.import).and_then(|s| s.at);
+    let frames = args.time.frames(task.input, range, alone.then_some(at), args.camera.turntable)?;
+    let single = !one_picture && !args.sheet.pixels.is_on() && !task.target.is_film(frames.len());
+    args.channels.check(task.target, single)?;
     if !one_picture {
         task.target.check_frames(frames.len()).map_err(|e| Failure::Usage(e.to_string()))?;
     }
-    let settings = args.output.settings()?;
+    let settings = args.output.settings(usual_size(task.import), args.renderer.coverage())?;
     let whole = [settings.width, settings.height];
     Ok(Plan { frames, size: args.camera.crop(whole)?.map_or(whole, |c| [c.width, c.height]) })
 }
 
 /// Draw the frames of a plan and write them.
 fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -> Result<Written, Failure> {
-    let asset = &task.import.asset;
+    if let Some(Setting::Notes(scene)) = &task.import.setting {
+        let written = shapes::draw(args, task, plan, scene, say)?;
+        say_samples(args, &written, 1, say);
+        totals.add(&written, 1);
+        return Ok(written);
+    }
+    let (asset, scene) = (&task.import.asset, scene(task.import));
     let character = &asset.character;
     let overlays = args.overlay.overlays(asset, args.time.fps)?;
     let bare = character.instances().iter().all(|i| character.mesh(i).triangles.is_empty());
-    if bare && overlays.is_empty() {
+    let props = scene.map(props).unwrap_or_default();
+    if bare && overlays.is_empty() && props.shapes.is_empty() {
         say.warn(&format!("{}: there are no triangles; the picture will be empty", task.input.display()));
     }
 
@@ -131,14 +171,26 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
     let threads = args.output.threads();
     let one_picture = args.sheet.is_one_picture();
     let alone = plan.frames.len() == 1 && !one_picture;
-    let settings = args.sheet.settings(args.output.settings()?)?;
+    let settings =
+        args.sheet.settings(args.output.settings(usual_size(task.import), args.renderer.coverage())?)?;
     let settings = Settings { threads: if alone { threads } else { 1 }, ..settings };
+    let look = args.look.look(asset, scene.map(|s| &s.look), |m| say.warn(m))?;
+    let renderer =
+        args.renderer.renderer(&look, &props, scene, args.sheet.pixels.is_on(), args.look.has_shadows())?;
+    if renderer == Renderer::Raster && !props.shapes.is_empty() {
+        say.warn(&format!(
+            "the rasterizer leaves {} shapes out; --renderer ray draws them",
+            props.shapes.len()
+        ));
+    }
     let desc = ShotDesc {
+        renderer,
         clip: task.clip,
         wrap: args.time.wrap(args.camera.turntable),
-        view: args.sheet.view(args.camera.view(asset)?, args.camera.is_default()),
+        view: args.sheet.view(args.camera.view(asset, scene)?, args.camera.is_default()),
         framing: args.camera.framing(asset)?,
-        look: args.look.look(asset, |m| say.warn(m))?,
+        look,
+        props,
         overlays,
         crop: args.camera.crop([settings.width, settings.height])?,
         settings,
@@ -151,6 +203,9 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
     let shot = Shot::new(asset, desc).map_err(|e| Failure::Usage(e.to_string()))?;
     totals.framing += start.elapsed();
     let moments = args.sheet.contact_frames(&shot);
+    let bones = character.skeleton();
+    let bones = bones.ids().map(|b| bones.name(b).to_string()).collect();
+    let beside = Beside::new(&args.channels, &shot, bones, args.output.png);
     let mut job = Job {
         shot: &shot,
         frames: moments.as_ref().unwrap_or(&plan.frames),
@@ -162,6 +217,9 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         // A sheet of which a part is there already is drawn again as a whole.
         force: args.output.force || (one_picture && args.batch.skip_existing),
         hash: args.batch.manifest.is_some(),
+        beside,
+        budget: args.renderer.budget,
+        bar: if alone { say.picture_progress() } else { indicatif::ProgressBar::hidden() },
         art: None,
         cost: Default::default(),
         scale: args.sheet.pixels.scale(),
@@ -173,10 +231,21 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         args.sheet.write(&job, name, say)?;
         job.cost.into_inner().unwrap_or_else(|e| e.into_inner())
     } else {
-        film::write(&job, say)?
+        let written = film::write(&job, say);
+        job.bar.finish_and_clear();
+        written?
     };
+    say_samples(args, &written, frames, say);
     totals.add(&written, frames);
     Ok(written)
+}
+
+/// Say how many samples pictures got that time ended.
+fn say_samples(args: &Args, written: &Written, frames: usize, say: &Say) {
+    let ended = args.renderer.budget.is_some() || say.verbose;
+    if let Some(samples) = renderer::reached(written.drawn.rays.samples, frames).filter(|_| ended) {
+        say.note(&samples);
+    }
 }
 
 /// Options that the format has no place for are not dropped in silence.

@@ -11,12 +11,9 @@ pub struct OutputArgs {
     /// standard output; of several inputs or clips with {name}, {folder} and {clip} in it.
     #[arg(short, long, value_name = "OUT", required_unless_present = "list")]
     output: Option<String>,
-    /// Pixels, as in 512 or 1920x1080.
-    #[arg(long, default_value = "512", value_name = "WxH", value_parser = parse_size)]
-    size: [usize; 2],
-    /// Coverage samples a pixel, 1 or 4.
-    #[arg(long, default_value = "4", value_parser = ["1", "4"])]
-    samples: String,
+    /// Pixels, as in 512 or 1920x1080; 512 if neither this nor the scene says.
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<[usize; 2]>,
     /// How hard to press PNG files: fast, balanced or best.
     #[arg(long, default_value = "fast", value_parser = parse_level)]
     pub png: PngLevel,
@@ -50,10 +47,9 @@ impl OutputArgs {
         target.map_err(|e| Failure::Usage(e.to_string()))
     }
 
-    /// Size and samples, for drawing on one thread.
-    pub fn settings(&self) -> Result<Settings, Failure> {
-        let [width, height] = self.size;
-        let samples = if self.samples == "1" { 1 } else { 4 };
+    /// Size and samples of the rasterizer's, for drawing on one thread; `usual` is the size where no option says it.
+    pub fn settings(&self, usual: Option<[usize; 2]>, samples: u8) -> Result<Settings, Failure> {
+        let [width, height] = self.size.or(usual).unwrap_or([512, 512]);
         let settings = Settings { width, height, samples, threads: 1 };
         settings.check().map_err(|e| Failure::Usage(format!("--size: {e}")))?;
         Ok(settings)

@@ -61,6 +61,10 @@ impl Totals {
             ("triangles binned", d.raster.drawn),
             ("samples covered", d.raster.samples),
             ("pixels shaded", d.raster.shaded),
+            ("rays from the eye", d.rays.count.primary),
+            ("rays to lamps", d.rays.count.shadow),
+            ("rays sent on", d.rays.count.secondary),
+            ("hits shaded", d.rays.count.shaded),
             ("bytes encoded", self.bytes),
         ];
         let times = [

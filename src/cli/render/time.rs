@@ -3,6 +3,7 @@
 use crate::cli::{Failure, find_clip};
 use sinew::frames::Moment;
 use sinew::io::Import;
+use sinew::io::scene::ours::Clip;
 use sinew::time::{FrameSet, Range, Rate, Wrap, frame_count, frame_time};
 use std::path::{Path, PathBuf};
 
@@ -45,16 +46,21 @@ pub struct Frame {
 impl TimeArgs {
     /// The clip that is asked for.
     pub fn clip(&self, import: &Import) -> Result<Option<usize>, Failure> {
-        if self.rest { Ok(None) } else { find_clip(import, self.clip.as_deref()) }
+        let of_scene = super::scene(import).and_then(|s| s.clip.as_ref()).map(|c| match c {
+            Clip::Name(name) => name.clone(),
+            Clip::Index(i) => i.to_string(),
+        });
+        let asked = self.clip.as_deref().or(of_scene.as_deref());
+        if self.rest { Ok(None) } else { find_clip(import, asked) }
     }
 
-    /// The frames to be drawn; `alone` if one picture is wanted where nothing says which; `lap` if the camera walks around in
+    /// The frames to be drawn; `alone` if one picture is wanted where nothing says which, of a moment that the scene may say; `lap` if the camera walks around in
     /// so many seconds.
     pub fn frames(
         &self,
         input: &Path,
         range: Range,
-        alone: bool,
+        alone: Option<Option<f64>>,
         lap: Option<f64>,
     ) -> Result<Vec<Frame>, Failure> {
         if let (Some(t), None) = (self.at, lap) {
@@ -65,7 +71,10 @@ impl TimeArgs {
         let whole = Range { start: 0.0, end: lap.unwrap_or(range.duration()) };
         match &self.frames {
             Some(set) => Ok(set.iter().map(timed).collect()),
-            None if alone => Ok(vec![timed(1)]),
+            None if alone.is_some() => Ok(match alone.flatten().filter(|_| lap.is_none()) {
+                Some(t) => vec![Frame { number: 1, moment: t.into() }],
+                None => vec![timed(1)],
+            }),
             None => {
                 let count = frame_count(whole, self.fps.fps(), MOST_FRAMES);
                 let count =

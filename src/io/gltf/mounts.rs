@@ -112,7 +112,7 @@ fn light(json: &punctual::Light) -> Option<Light> {
         }
         Checked::Invalid => return None,
     };
-    Some(Light { kind, color })
+    Some(Light::new(kind, color))
 }
 
 /// Roughly the middle of what is drawn: the mean of the boxes' centres, each carried by its first bone.

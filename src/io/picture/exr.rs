@@ -1,4 +1,4 @@
-//! One picture of linear light as OpenEXR.
+//! One picture of linear light as OpenEXR, with more channels beside it if wanted.
 //!
 //! Industrial Light & Magic, *OpenEXR File Layout*: scan lines in blocks of 16, each with its bytes taken apart, differenced
 //! and deflated ("ZIP"), a table of where the blocks are.
@@ -6,6 +6,7 @@
 use super::Error;
 use crate::image::Image;
 use std::io::Write;
+use std::ops::Range;
 
 /// How the numbers of an OpenEXR file are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Hash)]
@@ -21,8 +22,18 @@ pub enum ExrDepth {
 const BLOCK_ROWS: usize = 16;
 /// Longest side: coordinates are 32-bit.
 const LIMIT: usize = i32::MAX as usize / 2;
-/// Channels in the file's order, by name, with their place in a pixel.
-const CHANNELS: [(&str, usize); 4] = [("A", 3), ("B", 2), ("G", 1), ("R", 0)];
+/// A channel of the file.
+struct Channel<'a> {
+    name: &'a str,
+    from: Source<'a>,
+    half: bool,
+}
+
+/// Where its numbers are: a place in each pixel of the picture, or a list.
+enum Source<'a> {
+    Pixel(usize),
+    List(&'a [f32]),
+}
 
 /// Bytes of an OpenEXR file: the channels R, G, B and A of linear light, alpha premultiplied, Rec. 709 primaries.
 ///
@@ -32,26 +43,49 @@ const CHANNELS: [(&str, usize); 4] = [("A", 3), ("B", 2), ("G", 1), ("R", 0)];
 /// # Errors
 /// [`Error::Size`] where a side is zero or the buffer does not hold `width · height` pixels.
 pub fn encode_exr(picture: &Image, depth: ExrDepth) -> Result<Vec<u8>, Error> {
+    encode_exr_layers(picture, depth, &[])
+}
+
+/// The same with more channels in the file: a name such as `normal.X` (layer, point, component) and a 32-bit number a pixel each.
+///
+/// # Errors
+/// As [`encode_exr`]; also where a list does not hold a number for each pixel.
+pub fn encode_exr_layers(
+    picture: &Image,
+    depth: ExrDepth,
+    layers: &[(String, Vec<f32>)],
+) -> Result<Vec<u8>, Error> {
     let Image { width, height, ref pixels } = *picture;
     let fits = |n: usize| (1..=LIMIT).contains(&n);
-    if !fits(width) || !fits(height) || width.checked_mul(height) != Some(pixels.len()) {
+    let full = |n: usize| width.checked_mul(height) == Some(n);
+    if !fits(width) || !fits(height) || !full(pixels.len()) || layers.iter().any(|l| !full(l.1.len())) {
         let bytes = 16 * pixels.len();
         return Err(Error::Size { width, height, bytes, format: "OpenEXR", limit: LIMIT });
     }
-    let mut file = header(width, height, depth);
-    let blocks = pixels.chunks(width * BLOCK_ROWS);
+    let half = depth == ExrDepth::Half;
+    let color = |(c, name)| Channel { name, from: Source::Pixel(c), half };
+    let mut channels: Vec<Channel> = ["R", "G", "B", "A"].into_iter().enumerate().map(color).collect();
+    channels.extend(layers.iter().map(|l| Channel { name: &l.0, from: Source::List(&l.1), half: false }));
+    // Readers expect them sorted by their bytes.
+    channels.sort_by_key(|c| c.name);
+
+    let mut file = header(width, height, &channels);
     let table = file.len();
-    file.resize(table + 8 * blocks.len(), 0);
+    file.resize(table + 8 * height.div_ceil(BLOCK_ROWS), 0);
     let (mut raw, mut apart, mut sorted) = (Vec::new(), Vec::new(), Vec::new());
-    for (k, rows) in blocks.enumerate() {
+    for (k, top) in (0..height).step_by(BLOCK_ROWS).enumerate() {
         let offset = file.len() as u64;
         file[table + 8 * k..][..8].copy_from_slice(&offset.to_le_bytes());
-        gather(rows, width, depth, &mut raw);
+        raw.clear();
+        for y in top..height.min(top + BLOCK_ROWS) {
+            let row = y * width..(y + 1) * width;
+            channels.iter().for_each(|c| gather(c, pixels, row.clone(), &mut raw));
+        }
         take_apart(&raw, &mut apart, &mut sorted);
         let packed = deflate(&sorted)?;
         // What does not shrink is stored as it is; readers tell by the size.
         let data = if packed.len() < raw.len() { &packed } else { &raw };
-        file.extend(((k * BLOCK_ROWS) as i32).to_le_bytes());
+        file.extend((top as i32).to_le_bytes());
         file.extend((data.len() as i32).to_le_bytes());
         file.extend(data);
     }
@@ -59,7 +93,7 @@ pub fn encode_exr(picture: &Image, depth: ExrDepth) -> Result<Vec<u8>, Error> {
 }
 
 /// Magic number, version 2 and the attributes that every file must have.
-fn header(width: usize, height: usize, depth: ExrDepth) -> Vec<u8> {
+fn header(width: usize, height: usize, channels: &[Channel]) -> Vec<u8> {
     let mut h = vec![0x76, 0x2f, 0x31, 0x01, 2, 0, 0, 0];
     let mut attribute = |name: &str, kind: &str, value: &[u8]| {
         h.extend(name.bytes().chain([0]).chain(kind.bytes()).chain([0]));
@@ -70,7 +104,7 @@ fn header(width: usize, height: usize, depth: ExrDepth) -> Vec<u8> {
         [0, 0, width as i32 - 1, height as i32 - 1].iter().flat_map(|v| v.to_le_bytes()).collect();
     let (one, origin) = (1.0_f32.to_le_bytes(), [0; 8]);
     // 3 is ZIP in blocks of 16 rows; rows run downwards.
-    attribute("channels", "chlist", &channel_list(depth));
+    attribute("channels", "chlist", &channel_list(channels));
     attribute("compression", "compression", &[3]);
     attribute("dataWindow", "box2i", &window);
     attribute("displayWindow", "box2i", &window);
@@ -82,12 +116,11 @@ fn header(width: usize, height: usize, depth: ExrDepth) -> Vec<u8> {
     h
 }
 
-fn channel_list(depth: ExrDepth) -> Vec<u8> {
-    let kind: i32 = if depth == ExrDepth::Half { 1 } else { 2 };
+fn channel_list(channels: &[Channel]) -> Vec<u8> {
     let mut list = Vec::new();
-    for (name, _) in CHANNELS {
-        list.extend(name.bytes().chain([0]));
-        list.extend(kind.to_le_bytes());
+    for c in channels {
+        list.extend(c.name.bytes().chain([0]));
+        list.extend(if c.half { 1_i32 } else { 2 }.to_le_bytes());
         // Neither perceptually linear nor subsampled.
         list.extend([0; 4]);
         list.extend([1_i32.to_le_bytes(), 1_i32.to_le_bytes()].concat());
@@ -96,22 +129,13 @@ fn channel_list(depth: ExrDepth) -> Vec<u8> {
     list
 }
 
-/// Numbers of some rows: row by row, channel by channel.
-fn gather(rows: &[[f32; 4]], width: usize, depth: ExrDepth, out: &mut Vec<u8>) {
-    let bytes = if depth == ExrDepth::Half { 2 } else { 4 };
-    out.resize(4 * bytes * rows.len(), 0);
-    for (line, row) in out.chunks_exact_mut(4 * bytes * width).zip(rows.chunks_exact(width)) {
-        for (to, (_, c)) in line.chunks_exact_mut(bytes * width).zip(CHANNELS) {
-            match depth {
-                ExrDepth::Float => store(to, row.iter().map(|p| p[c].to_le_bytes())),
-                ExrDepth::Half => store(to, row.iter().map(|p| half(p[c]).to_le_bytes())),
-            }
-        }
+/// A row of a channel.
+fn gather(channel: &Channel, pixels: &[[f32; 4]], row: Range<usize>, out: &mut Vec<u8>) {
+    match (&channel.from, channel.half) {
+        (Source::Pixel(c), true) => out.extend(pixels[row].iter().flat_map(|p| half(p[*c]).to_le_bytes())),
+        (Source::Pixel(c), false) => out.extend(pixels[row].iter().flat_map(|p| p[*c].to_le_bytes())),
+        (Source::List(list), _) => out.extend(list[row].iter().flat_map(|v| v.to_le_bytes())),
     }
-}
-
-fn store<const N: usize>(to: &mut [u8], numbers: impl Iterator<Item = [u8; N]>) {
-    to.as_chunks_mut::<N>().0.iter_mut().zip(numbers).for_each(|(to, n)| *to = n);
 }
 
 /// Even bytes before odd ones, then each as its difference from the one before, plus 128. Their number is even.

@@ -11,6 +11,8 @@ use crate::image::Rgba8;
 pub enum Data<'a> {
     /// Red, green, blue and alpha of 8 bits.
     Rgba8(&'a [[u8; 4]]),
+    /// Red, green, blue and alpha of 16 bits.
+    Rgba16(&'a [[u16; 4]]),
     /// One value of 16 bits.
     Gray16(&'a [u16]),
     /// Places in a list of sRGB colours; 0 is transparent. At most 256 colours.
@@ -70,32 +72,29 @@ pub fn encode_indexed_png(picture: &Indexed, palette: &Palette, level: PngLevel)
         alpha = Some([vec![255; colors.len()], vec![0]].concat());
         colors.push([0; 3]);
     }
-    encode_palette(picture.size, &picture.indices, &colors, alpha, level)
+    encode_palette(picture.size, &picture.indices, &colors, alpha, level, "")
 }
 
-/// Bytes of a PNG file of data.
+/// Bytes of a PNG file of data; `note` says for readers what the numbers mean, if it is not empty.
 ///
 /// # Errors
 /// [`Error::Size`] where a side is zero or the pixels do not fill the picture.
-pub fn encode_data_png(size: [usize; 2], data: Data, level: PngLevel) -> Result<Vec<u8>, Error> {
+pub fn encode_data_png(size: [usize; 2], data: Data, level: PngLevel, note: &str) -> Result<Vec<u8>, Error> {
+    use ::png::{BitDepth, ColorType};
+    let wide = |values: &[u16]| values.iter().flat_map(|v| v.to_be_bytes()).collect();
     let (bytes, color, depth) = match data {
-        Data::Rgba8(pixels) => {
-            (pixels.as_flattened().to_vec(), ::png::ColorType::Rgba, ::png::BitDepth::Eight)
-        }
-        Data::Gray16(values) => {
-            let bytes = values.iter().flat_map(|v| v.to_be_bytes()).collect();
-            (bytes, ::png::ColorType::Grayscale, ::png::BitDepth::Sixteen)
-        }
+        Data::Rgba8(pixels) => (pixels.as_flattened().to_vec(), ColorType::Rgba, BitDepth::Eight),
+        Data::Rgba16(pixels) => (wide(pixels.as_flattened()), ColorType::Rgba, BitDepth::Sixteen),
+        Data::Gray16(values) => (wide(values), ColorType::Grayscale, BitDepth::Sixteen),
         Data::Index8(indices, colors) => {
-            return encode_palette(size, indices, colors, Some(vec![0]), level);
+            return encode_palette(size, indices, colors, Some(vec![0]), level, note);
         }
     };
-    check_sides(size, bytes.len(), color.samples() * if depth == ::png::BitDepth::Sixteen { 2 } else { 1 })?;
+    check_sides(size, bytes.len(), color.samples() * if depth == BitDepth::Sixteen { 2 } else { 1 })?;
     let mut out = Vec::new();
-    let mut encoder = ::png::Encoder::new(&mut out, size[0] as u32, size[1] as u32);
+    let mut encoder = encoder(&mut out, size, level, note)?;
     encoder.set_color(color);
     encoder.set_depth(depth);
-    encoder.set_compression(level.compression());
     finish(encoder, &bytes)?;
     Ok(out)
 }
@@ -106,21 +105,35 @@ fn encode_palette(
     colors: &[[u8; 3]],
     alpha: Option<Vec<u8>>,
     level: PngLevel,
+    note: &str,
 ) -> Result<Vec<u8>, Error> {
     check_sides(size, indices.len(), 1)?;
     let mut out = Vec::new();
-    let mut encoder = ::png::Encoder::new(&mut out, size[0] as u32, size[1] as u32);
+    let mut encoder = encoder(&mut out, size, level, note)?;
     encoder.set_color(::png::ColorType::Indexed);
     encoder.set_depth(::png::BitDepth::Eight);
     encoder.set_palette(colors.as_flattened().to_vec());
     if let Some(alpha) = alpha {
         encoder.set_trns(alpha);
     }
-    encoder.set_compression(level.compression());
     // Differences of indices mean nothing.
     encoder.set_filter(::png::Filter::NoFilter);
     finish(encoder, indices)?;
     Ok(out)
+}
+
+fn encoder<'a>(
+    out: &'a mut Vec<u8>,
+    size: [usize; 2],
+    level: PngLevel,
+    note: &str,
+) -> Result<::png::Encoder<'a, &'a mut Vec<u8>>, Error> {
+    let mut encoder = ::png::Encoder::new(out, size[0] as u32, size[1] as u32);
+    encoder.set_compression(level.compression());
+    if !note.is_empty() {
+        encoder.add_itxt_chunk("Description".into(), note.into()).map_err(failed)?;
+    }
+    Ok(encoder)
 }
 
 fn finish(encoder: ::png::Encoder<'_, &mut Vec<u8>>, bytes: &[u8]) -> Result<(), Error> {

@@ -42,7 +42,7 @@ mod y4m;
 
 pub use atomic::{AtomicFile, Folder, cleanup_temporaries};
 pub use dither::{Dither, Indexed, Mapper};
-pub use exr::{ExrDepth, encode_exr};
+pub use exr::{ExrDepth, encode_exr, encode_exr_layers};
 pub use film::{Film, FilmReport};
 pub use format::{Format, FormatError};
 pub use indexed::{Data, encode_data_png, encode_indexed_png};

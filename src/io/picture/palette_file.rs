@@ -142,7 +142,7 @@ mod tests {
         assert_eq!(Palette::from_file_bytes(b"; two\n1a1c2c // night\n\n#f4f4f4\n").unwrap().colors(), want);
         let pixels = [[26, 28, 44, 255], [9, 9, 9, 0], [244, 244, 244, 255], [26, 28, 44, 255]];
         let data = super::super::indexed::Data::Rgba8(&pixels);
-        let png = super::super::encode_data_png([4, 1], data, Default::default()).unwrap();
+        let png = super::super::encode_data_png([4, 1], data, Default::default(), "").unwrap();
         assert_eq!(Palette::from_file_bytes(&png).unwrap().colors(), want);
         assert!(Palette::from_file_bytes(&png[..40]).is_err());
     }

@@ -108,6 +108,15 @@ impl Accel {
         Self { machine: Machine::new(isa), ..self }
     }
 
+    /// Whether these are the triangles that it was built of: then [`Accel::update`] is enough when vertices move.
+    pub fn is_of(&self, triangles: &[[u32; 3]]) -> bool {
+        let same = |(pack, v): (&Pack, &Vertices)| {
+            let lanes = (0..4).filter(|&lane| pack.ids[lane] != EMPTY);
+            lanes.into_iter().all(|k| triangles[pack.ids[k] as usize] == [v[0][k], v[1][k], v[2][k]])
+        };
+        self.triangles == triangles.len() && self.packs.iter().zip(&self.vertices).all(same)
+    }
+
     /// Corner of the box with the smallest coordinates, and with the largest; `None` without triangles.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
         (self.triangles > 0).then_some(self.span.corners())

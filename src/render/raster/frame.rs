@@ -6,9 +6,7 @@ use crate::render::Settings;
 use crate::scene::{AlphaMode, Material, Object, Projection, Scene};
 use glam::{Vec3, Vec4};
 
-/// Samples a pixel, in 1/256 pixels from its centre: a rotated grid, so that near-horizontal and near-vertical edges both
-/// get four steps.
-pub(super) const ROTATED: [[i32; 2]; 4] = [[-32, -96], [96, -32], [-96, 32], [32, 96]];
+pub(super) use crate::render::ROTATED;
 
 /// How an object takes part in visibility.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

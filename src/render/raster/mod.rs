@@ -32,8 +32,9 @@ mod tile;
 mod vertex;
 mod window;
 
+pub use super::channel::IdImage;
 use super::channel::{Channel, Channels};
-use super::{Settings, Window};
+use super::{Settings, Window, each};
 use crate::image::{Image, Rgba8};
 use crate::math::simd::{self, Isa};
 use crate::scene::Scene;
@@ -45,21 +46,6 @@ use window::View;
 
 /// Pixels along a tile's side.
 pub(crate) const TILE: usize = 64;
-
-/// Object, triangle and depth of each pixel's centre, row by row from the top left.
-#[derive(Clone, Debug, PartialEq, Default)]
-pub struct IdImage {
-    /// Pixels a row.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// Index of the object plus one; 0 where nothing is.
-    pub objects: Vec<u32>,
-    /// Index of the triangle in its mesh; 0 where nothing is.
-    pub triangles: Vec<u32>,
-    /// Distance along the view direction, metres; infinite where nothing is.
-    pub depth: Vec<f32>,
-}
 
 /// What was done for a picture, counted exactly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -110,12 +96,12 @@ impl std::ops::AddAssign for Stats {
 /// let positions = vec![Vec3::new(-2.0, -2.0, 0.0), Vec3::new(2.0, -2.0, 0.0), Vec3::new(0.0, 4.0, 0.0)];
 /// let mesh = Mesh::new(MeshData { positions, triangles: vec![[0, 1, 2]], ..Default::default() }).unwrap();
 /// let object = Object {
-///     mesh: &mesh, positions: &mesh.positions, normals: &[], tangents: &[], material: 0, mirrored: false,
+///     mesh: &mesh, positions: &mesh.positions, normals: &[], tangents: &[], material: 0, mirrored: false, labels: &[],
 /// };
 /// let camera = Camera::look_at(Vec3::Z * 3.0, Vec3::ZERO, Vec3::Y, Projection::Orthographic { height: 1.0 });
 /// let scene = Scene {
 ///     camera: camera.unwrap(), ambient: Vec3::ONE, lights: vec![], style: Default::default(), background: [0.0; 4],
-///     objects: vec![object], materials: &[Material::default()], textures: &[],
+///     objects: vec![object], shapes: &[], materials: &[Material::default()], textures: &[],
 /// };
 /// let mut picture = Rgba8::default();
 /// let settings = Settings { width: 4, height: 4, samples: 4, threads: 1 };
@@ -143,6 +129,11 @@ impl Rasterizer {
     /// window's size, and its pixels are the whole picture's, bit for bit. What of it lies outside the picture is left out.
     pub fn set_window(&mut self, window: Option<Window>) {
         self.window = window;
+    }
+
+    /// What [`Rasterizer::set_window`] was told last.
+    pub fn window(&self) -> Option<Window> {
+        self.window
     }
 
     /// Draw to 8-bit sRGB with straight alpha; `out` takes the size of `settings`.
@@ -212,6 +203,9 @@ impl Rasterizer {
         view.cut(1, &mut out.objects);
         view.cut(1, &mut out.depth);
         view.cut(1, &mut out.normals);
+        view.cut(1, &mut out.labels);
+        view.cut(1, &mut out.positions);
+        view.cut(1, &mut out.uvs);
         [out.width, out.height] = view.size();
         stats
     }
@@ -231,14 +225,14 @@ impl Rasterizer {
         self.bins.resize_with(threads.max(self.bins.len()), Bins::default);
         let (isa, vertices) = (self.isa, &self.vertices);
         let shares: Vec<(usize, &mut Bins)> = self.bins[..threads].iter_mut().enumerate().collect();
-        each(shares, threads, |(k, bins)| bins.fill(isa, &frame, vertices, k, threads));
+        each(shares, |(k, bins)| bins.fill(isa, &frame, vertices, k, threads));
 
         // Draw the rows of tiles.
         self.tiles.resize_with(threads.max(self.tiles.len()), TileScratch::default);
         let bins = &self.bins[..threads];
         let rows = std::sync::Mutex::new((tiles.y / TILE..).zip(bands));
         let workers: Vec<&mut TileScratch> = self.tiles[..threads].iter_mut().collect();
-        each(workers, threads, |scratch| {
+        each(workers, |scratch| {
             scratch.stats = Stats::default();
             loop {
                 let next = rows.lock().expect("no worker panics").next();
@@ -250,16 +244,4 @@ impl Rasterizer {
         self.tiles[..threads].iter().for_each(|t| stats += t.stats);
         stats
     }
-}
-
-/// Do every task, each on its own thread if there is more than one.
-fn each<T: Send>(tasks: Vec<T>, threads: usize, work: impl Fn(T) + Sync) {
-    if threads <= 1 {
-        return tasks.into_iter().for_each(work);
-    }
-    std::thread::scope(|s| {
-        for task in tasks {
-            s.spawn(|| work(task));
-        }
-    });
 }

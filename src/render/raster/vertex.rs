@@ -43,7 +43,7 @@ impl Vertices {
             return tasks.into_iter().for_each(|t| simd::run(isa, t));
         }
         let queue = std::sync::Mutex::new(tasks.into_iter());
-        super::each((0..threads).collect(), threads, |_| {
+        super::each((0..threads).collect(), |_| {
             while let Some(t) = { queue.lock().expect("no worker panics").next() } {
                 simd::run(isa, t);
             }

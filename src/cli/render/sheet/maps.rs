@@ -1,5 +1,6 @@
 //! Pictures of a sheet's layout that say more than its colour does: normals, depth, objects.
 
+use super::super::channels::{depth_code, distinct_color, normal_code};
 use super::super::time::Frame;
 use super::sprites::{Placed, Plan, file_name};
 use super::{MapName, Painter, SheetArgs, draw};
@@ -96,7 +97,7 @@ fn fill(
             depth.put(place, &at(trim).map(|k| seen.depth[k]).collect::<Vec<_>>(), extrude);
         }
         if let Some(normals) = &mut to.normals {
-            let code = |k: usize| if seen.objects[k] > 0 { encode(seen.normals[k].to_array()) } else { FLAT };
+            let code = |k: usize| if seen.objects[k] > 0 { normal_code(seen.normals[k]) } else { FLAT };
             normals.put(place, &at(trim).map(code).collect::<Vec<_>>(), extrude);
         }
         Ok(())
@@ -127,18 +128,13 @@ fn grow(seen: &mut Channels) {
     }
 }
 
-/// `(n + 1)/2` in 8 bits.
-fn encode(n: [f32; 3]) -> [u8; 3] {
-    n.map(|c| ((c.clamp(-1.0, 1.0) + 1.0) * 127.5).round() as u8)
-}
-
 type Made = (MapKind, Result<Vec<u8>, picture::Error>);
 
 fn normals(from: &Canvases, placed: &Placed, plan: &Plan) -> Made {
     let normals = from.normals.iter().flat_map(|c| &c.pixels);
     let pixel = |([x, y, z], a): (&[u8; 3], &u8)| [*x, *y, *z, *a];
     let pixels: Vec<[u8; 4]> = normals.zip(&placed.alpha).map(pixel).collect();
-    (MapKind::Normal, encode_data_png(placed.layout.size, Data::Rgba8(&pixels), plan.job.level))
+    (MapKind::Normal, encode_data_png(placed.layout.size, Data::Rgba8(&pixels), plan.job.level, ""))
 }
 
 fn depth(from: &Canvases, placed: &Placed, plan: &Plan) -> Made {
@@ -149,14 +145,10 @@ fn depth(from: &Canvases, placed: &Placed, plan: &Plan) -> Made {
     // A flat picture still needs a range.
     let far = if far > near { far } else { near + near.abs().max(1.0) * 1e-3 };
     let code = |(d, a): (&f32, &u8)| {
-        if *a == 0 || !d.is_finite() {
-            return 0;
-        }
-        // 0 is left to what shows nothing.
-        ((far - d) / (far - near) * 65535.0).round().max(1.0) as u16
+        if *a == 0 { 0 } else { depth_code(*d, [near, far]) }
     };
     let pixels: Vec<u16> = depth().zip(&placed.alpha).map(code).collect();
-    let bytes = encode_data_png(placed.layout.size, Data::Gray16(&pixels), plan.job.level);
+    let bytes = encode_data_png(placed.layout.size, Data::Gray16(&pixels), plan.job.level, "");
     (MapKind::Depth { near, far }, bytes)
 }
 
@@ -167,25 +159,6 @@ fn objects(from: &Canvases, placed: &Placed, plan: &Plan, names: &[String]) -> M
     colors.extend(objects.iter().map(|o| o.1));
     let code = |(o, a): (&u32, &u8)| if *a > 0 { *o as u8 } else { 0 };
     let indices: Vec<u8> = from.objects.pixels.iter().zip(&placed.alpha).map(code).collect();
-    let bytes = encode_data_png(placed.layout.size, Data::Index8(&indices, &colors), plan.job.level);
+    let bytes = encode_data_png(placed.layout.size, Data::Index8(&indices, &colors), plan.job.level, "");
     (MapKind::Object { objects }, bytes)
-}
-
-/// The `i`-th of colours that are far from one another: hues at steps of the golden ratio, in two lightnesses.
-fn distinct_color(i: usize) -> [u8; 3] {
-    let hue = (i as u32).wrapping_mul(0x9e37) % 0x10000 * 6;
-    let (sector, f) = (hue >> 16, hue & 0xffff);
-    let high = if i.is_multiple_of(2) { 235 } else { 170 };
-    let low = high / 4;
-    let up = low + (((high - low) * f) >> 16);
-    let down = high - (((high - low) * f) >> 16);
-    let [r, g, b] = match sector {
-        0 => [high, up, low],
-        1 => [down, high, low],
-        2 => [low, high, up],
-        3 => [low, down, high],
-        4 => [up, low, high],
-        _ => [high, low, down],
-    };
-    [r as u8, g as u8, b as u8]
 }
