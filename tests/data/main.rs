@@ -10,6 +10,7 @@ mod invalid;
 mod notes;
 #[path = "../../src/test_rng.rs"]
 mod rng;
+mod scenes;
 mod sha256;
 mod support;
 
@@ -45,6 +46,7 @@ const TESTS: &[(&str, Test)] = &[
     ("notes::the_mosaic_is_that_of_the_notes", images::the_mosaic_is_that_of_the_notes),
     ("notes::hues_are_those_of_the_notes", images::hues_are_those_of_the_notes),
     ("notes::layers_are_composited_as_in_the_notes", images::layers_are_composited_as_in_the_notes),
+    ("notes::every_scene_is_drawn", scenes::every_scene_is_drawn),
     ("changed_bytes_never_panic", gltf_mutations::run),
     ("broken_files_are_refused_politely", invalid::run),
     ("the_program_survives_broken_files", invalid::program),

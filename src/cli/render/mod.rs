@@ -143,7 +143,7 @@ fn plan(args: &Args, task: &Task) -> Result<Plan, Failure> {
 fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -> Result<Written, Failure> {
     if let Some(Setting::Notes(scene)) = &task.import.setting {
         let written = shapes::draw(args, task, plan, scene, say)?;
-        say_samples(args, &written, 1, say);
+        say_samples(args, &written, plan.size[0] * plan.size[1], say);
         totals.add(&written, 1);
         return Ok(written);
     }
@@ -235,15 +235,15 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         job.bar.finish_and_clear();
         written?
     };
-    say_samples(args, &written, frames, say);
+    say_samples(args, &written, frames * shot.size()[0] * shot.size()[1], say);
     totals.add(&written, frames);
     Ok(written)
 }
 
 /// Say how many samples pictures got that time ended.
-fn say_samples(args: &Args, written: &Written, frames: usize, say: &Say) {
-    let ended = args.renderer.budget.is_some() || say.verbose;
-    if let Some(samples) = renderer::reached(written.drawn.rays.samples, frames).filter(|_| ended) {
+fn say_samples(args: &Args, written: &Written, pixels: usize, say: &Say) {
+    let ended = args.renderer.ends_early() || say.verbose;
+    if let Some(samples) = renderer::reached(&written.drawn.rays, pixels).filter(|_| ended) {
         say.note(&samples);
     }
 }
