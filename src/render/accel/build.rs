@@ -1,48 +1,73 @@
-//! Top-down build by binned surface-area heuristic (Wald 2007), eight children at once.
+//! Top-down build in twos by binned surface-area heuristic (Wald 2007), then in eights at the least cost.
 
 use super::lanes::DEPTH;
 use super::tree::{LEAF, Node};
-use glam::Vec3;
+use glam::{Vec3, Vec3A, Vec4};
 
 /// Triangles in a leaf at most.
 pub(super) const LEAF_SIZE: usize = 4;
 
 const BINS: usize = 16;
 
+/// Set in the bits of an id, so that it is no denormal number: those would halve the speed.
+const TAG: u32 = 1 << 30;
+
 /// A box and what it holds.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Item {
-    pub lo: Vec3,
-    pub id: u32,
-    pub hi: Vec3,
+    /// The low corner; the bits of the last component are who it is.
+    lo: Vec4,
+    hi: Vec4,
 }
 
 impl Item {
-    fn centre(&self) -> Vec3 {
-        self.lo + self.hi
+    pub fn new(lo: Vec3A, hi: Vec3A, id: u32) -> Self {
+        Self { lo: lo.extend(f32::from_bits(id | TAG)), hi: hi.extend(0.0) }
+    }
+
+    #[inline(always)]
+    fn id(&self) -> u32 {
+        self.lo.w.to_bits() ^ TAG
+    }
+
+    #[inline(always)]
+    pub fn span(&self) -> Span {
+        Span { lo: Vec3A::from_vec4(self.lo), hi: Vec3A::from_vec4(self.hi) }
     }
 }
 
 /// A growing box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Span {
-    pub lo: Vec3,
-    pub hi: Vec3,
+    pub lo: Vec3A,
+    pub hi: Vec3A,
 }
 
 impl Span {
-    pub const EMPTY: Self = Self { lo: Vec3::INFINITY, hi: Vec3::NEG_INFINITY };
+    pub const EMPTY: Self = Self { lo: Vec3A::INFINITY, hi: Vec3A::NEG_INFINITY };
 
     #[inline(always)]
-    pub fn add(&mut self, lo: Vec3, hi: Vec3) {
-        self.lo = self.lo.min(lo);
-        self.hi = self.hi.max(hi);
+    pub fn join(&mut self, other: Self) {
+        self.lo = self.lo.min(other.lo);
+        self.hi = self.hi.max(other.hi);
+    }
+
+    /// Twice the centre.
+    #[inline(always)]
+    fn centre(&self) -> Vec3A {
+        self.lo + self.hi
     }
 
     /// Half its surface; 0 when empty.
+    #[inline(always)]
     pub fn area(&self) -> f32 {
-        let d = (self.hi - self.lo).max(Vec3::ZERO);
+        let d = (self.hi - self.lo).max(Vec3A::ZERO);
         d.x * d.y + d.y * d.z + d.z * d.x
+    }
+
+    /// Its two corners.
+    pub fn corners(&self) -> (Vec3, Vec3) {
+        (self.lo.into(), self.hi.into())
     }
 }
 
@@ -59,8 +84,9 @@ impl Range {
     fn new(items: &[Item], start: usize, end: usize) -> Self {
         let (mut span, mut centres) = (Span::EMPTY, Span::EMPTY);
         for i in &items[start..end] {
-            span.add(i.lo, i.hi);
-            centres.add(i.centre(), i.centre());
+            let own = i.span();
+            span.join(own);
+            centres.join(Span { lo: own.centre(), hi: own.centre() });
         }
         Self { start, end, span, centres }
     }
@@ -70,7 +96,7 @@ impl Range {
     }
 }
 
-/// What grows: nodes parent first, and leaves (their items' ids) in the order of the tree.
+/// A finished tree: nodes parent first, and leaves (their items' ids) in the order of the tree.
 #[derive(Default)]
 pub(super) struct Grown {
     pub nodes: Vec<Node>,
@@ -82,96 +108,193 @@ pub(super) struct Grown {
 /// Build over all items; the result does not depend on the number of threads. A leaf holds at most `leaf` items; empty places
 /// are `u32::MAX`.
 pub(super) fn grow(items: &mut [Item], leaf: usize, threads: usize) -> Grown {
-    let mut grown = Grown::default();
     if items.is_empty() {
-        return grown;
+        return Grown::default();
     }
+    // Split in two until the parts are worth a task each.
+    let (mut forks, mut tasks) = (Vec::new(), Vec::new());
+    let share = (items.len() / 16).max(1024);
     let all = Range::new(items, 0, items.len());
-    let ranges = eight(items, all, leaf, DEPTH);
-    let mut node = Node::EMPTY;
-    ranges.iter().enumerate().for_each(|(i, r)| node.set(i, (r.span.lo, r.span.hi)));
-    node.sort();
-    grown.nodes.push(node);
-
-    // Each child is grown by itself.
-    let mut tasks = Vec::new();
-    let mut rest = items;
-    for r in &ranges {
-        let (own, others) = rest.split_at_mut(r.len());
-        let moved = Range { start: 0, end: r.len(), ..*r };
-        tasks.push((own, moved, Grown::default()));
+    fork(items, all, leaf, DEPTH, share, &mut forks, &mut tasks);
+    let mut rest = &mut *items;
+    let mut parts = Vec::new();
+    for (at, range, depth) in tasks {
+        let (own, others) = rest.split_at_mut(range.len());
+        parts.push((at, own, range, depth, Vec::new()));
         rest = others;
     }
-    super::each(tasks.iter_mut().collect(), threads, |(own, range, part)| {
-        part.nodes.reserve(own.len() / 4);
-        part.leaves.reserve(own.len() / 3);
-        child(own, *range, leaf, DEPTH - 1, part);
+    super::each(parts.iter_mut().collect(), threads, |(_, own, range, depth, part)| {
+        let own_range = Range { start: 0, end: range.len(), ..*range };
+        fork(own, own_range, leaf, *depth, 0, part, &mut Vec::new());
     });
 
     // Put the parts one after another.
-    for (lane, (_, _, part)) in tasks.into_iter().enumerate() {
-        let base = [grown.nodes.len() as u32, grown.leaves.len() as u32];
-        let moved = |c: u32| c + base[(c & LEAF != 0) as usize];
-        grown.nodes[0].children[lane] = moved(if part.nodes.is_empty() { LEAF } else { 0 });
-        let nodes = part.nodes.into_iter().map(|n| Node { children: n.children.map(moved), ..n });
-        grown.nodes.extend(nodes);
-        grown.leaves.extend(part.leaves);
-        grown.cuts.push([grown.nodes.len(), grown.leaves.len()]);
+    for (at, _, range, _, part) in parts {
+        let (base, start) = (forks.len() as u32, range.start as u32);
+        let moved =
+            |f: Fork| Fork { left: f.left + base, right: f.right + base, start: f.start + start, ..f };
+        forks.extend(part.into_iter().map(moved));
+        forks[at] = forks[base as usize];
     }
-    grown
+    let mut wide = Wide { items, forks: &forks, choices: choices(&forks), grown: Grown::default() };
+    wide.emit_root();
+    wide.grown
 }
 
-/// A leaf, or a node with what is below it; gives what its parent writes down.
-fn child(items: &mut [Item], range: Range, leaf: usize, depth: usize, grown: &mut Grown) -> u32 {
-    if range.len() <= leaf {
-        let mut ids = [u32::MAX; LEAF_SIZE];
-        ids.iter_mut().zip(&items[range.start..range.end]).for_each(|(id, item)| *id = item.id);
-        ids[..range.len()].sort_unstable();
-        grown.leaves.push(ids);
-        return LEAF | (grown.leaves.len() - 1) as u32;
-    }
-    let at = grown.nodes.len();
-    grown.nodes.push(Node::EMPTY);
-    for (i, r) in eight(items, range, leaf, depth).into_iter().enumerate() {
-        grown.nodes[at].set(i, (r.span.lo, r.span.hi));
-        grown.nodes[at].children[i] = child(items, r, leaf, depth - 1, grown);
-    }
-    grown.nodes[at].sort();
-    at as u32
+/// A node of the tree of twos: two children, or `count` items from `start`.
+#[derive(Clone, Copy)]
+struct Fork {
+    span: Span,
+    left: u32,
+    right: u32,
+    start: u32,
+    /// 0 unless it is a leaf.
+    count: u32,
 }
 
-/// Split until there are eight: always the one with the largest surface.
-fn eight(items: &mut [Item], range: Range, leaf: usize, depth: usize) -> Vec<Range> {
-    // What a child may hold so that halving alone still fits below it.
-    let room = leaf.saturating_mul(8usize.saturating_pow(depth as u32 - 1));
-    let mut ranges = vec![range];
-    while ranges.len() < 8 {
-        let worth = |r: &Range| if r.len() > leaf { (r.len() > room, r.span.area()) } else { (false, -1.0) };
-        let (mut best, mut most) = (0, (false, -1.0));
-        for (i, r) in ranges.iter().enumerate() {
-            if worth(r) > most {
-                (best, most) = (i, worth(r));
-            }
-        }
-        if ranges[best].len() <= leaf {
-            break;
-        }
+/// Grow the tree of twos below a range, parents first; ranges of at most `share` items are left to `tasks`.
+fn fork(
+    items: &mut [Item],
+    range: Range,
+    leaf: usize,
+    depth: usize,
+    share: usize,
+    out: &mut Vec<Fork>,
+    tasks: &mut Vec<(usize, Range, usize)>,
+) -> u32 {
+    let at = out.len();
+    let count = if range.len() <= leaf { range.len() as u32 } else { 0 };
+    out.push(Fork { span: range.span, left: 0, right: 0, start: range.start as u32, count });
+    if range.len() <= share {
+        tasks.push((at, range, depth));
+    } else if count == 0 {
         // Close to the last level that there is, halves.
-        let [a, b] = split(items, ranges[best], leaf, range.len() > room);
-        ranges[best] = a;
-        ranges.insert(best + 1, b);
+        let room = leaf.saturating_mul(1 << (depth - 1).min(40));
+        let [a, b] = split(items, range, leaf, 2 * range.len() > room);
+        out[at].left = fork(items, a, leaf, depth - 1, share, out, tasks);
+        out[at].right = fork(items, b, leaf, depth - 1, share, out, tasks);
     }
-    ranges
+    at as u32
 }
 
 /// In two: where the surface-area heuristic is lowest, or in the middle where it cannot tell.
 fn split(items: &mut [Item], r: Range, leaf: usize, halve: bool) -> [Range; 2] {
-    let middle = if halve { None } else { cheapest(&items[r.start..r.end], &r, leaf) };
-    let middle = match middle {
+    let plane = if halve { None } else { cheapest(&items[r.start..r.end], &r, leaf) };
+    let middle = match plane {
         Some(plane) => r.start + partition(&mut items[r.start..r.end], |i| plane.left(i)),
         None => r.start + r.len() / 2,
     };
     [Range::new(items, r.start, middle), Range::new(items, middle, r.end)]
+}
+
+/// Cost of a leaf against that of a node.
+const LEAF_COST: f32 = 1.0;
+
+/// For every fork, how many of `j` places its left side gets when its subtree is to fill at most `j` places of a node, at the
+/// least surface-area cost (Ylitie, Karras, Laine 2017 §3.1): at `j − 1`; 0 where `j − 1` places are as good. At 0, how a node of
+/// its own is filled.
+fn choices(forks: &[Fork]) -> Vec<[u8; 8]> {
+    let mut costs = vec![[0.0f32; 8]; forks.len()];
+    let mut choices = vec![[0u8; 8]; forks.len()];
+    for (at, fork) in forks.iter().enumerate().rev() {
+        let area = fork.span.area();
+        if fork.count > 0 {
+            costs[at] = [area * LEAF_COST; 8];
+            continue;
+        }
+        let (left, right) = (costs[fork.left as usize], costs[fork.right as usize]);
+        let mut best = [(f32::INFINITY, 0u8); 9];
+        for j in 2..=8 {
+            for k in 1..j {
+                let cost = left[k - 1] + right[j - k - 1];
+                if cost < best[j].0 {
+                    best[j] = (cost, k as u8);
+                }
+            }
+        }
+        (costs[at][0], choices[at][0]) = (area + best[8].0, best[8].1);
+        for j in 2..=8 {
+            let less = costs[at][j - 2];
+            (costs[at][j - 1], choices[at][j - 1]) = if best[j].0 < less { best[j] } else { (less, 0) };
+        }
+    }
+    choices
+}
+
+/// The tree of eights taking shape.
+struct Wide<'a> {
+    items: &'a [Item],
+    forks: &'a [Fork],
+    choices: Vec<[u8; 8]>,
+    grown: Grown,
+}
+
+impl Wide<'_> {
+    /// The forks that fill `places` of a node with what is below `at`.
+    fn gather(&self, at: u32, places: usize, out: &mut Vec<u32>) {
+        let fork = &self.forks[at as usize];
+        if fork.count > 0 || places == 1 {
+            return out.push(at);
+        }
+        match self.choices[at as usize][places - 1] as usize {
+            0 => self.gather(at, places - 1, out),
+            k => {
+                self.gather(fork.left, k, out);
+                self.gather(fork.right, places - k, out);
+            }
+        }
+    }
+
+    /// The children of a node.
+    fn children(&self, at: u32) -> Vec<u32> {
+        let fork = &self.forks[at as usize];
+        let mut out = Vec::with_capacity(8);
+        if fork.count > 0 {
+            out.push(at);
+        } else {
+            let k = self.choices[at as usize][0] as usize;
+            self.gather(fork.left, k, &mut out);
+            self.gather(fork.right, 8 - k, &mut out);
+        }
+        out
+    }
+
+    /// A leaf, or a node with what is below it; gives what its parent writes down.
+    fn emit(&mut self, at: u32) -> u32 {
+        let Fork { start, count, .. } = self.forks[at as usize];
+        if count > 0 {
+            let mut ids = [u32::MAX; LEAF_SIZE];
+            let own = &self.items[start as usize..][..count as usize];
+            ids.iter_mut().zip(own).for_each(|(id, item)| *id = item.id());
+            ids[..count as usize].sort_unstable();
+            self.grown.leaves.push(ids);
+            return LEAF | (self.grown.leaves.len() - 1) as u32;
+        }
+        let node = self.open(at);
+        for (lane, child) in self.children(at).into_iter().enumerate() {
+            self.grown.nodes[node].children[lane] = self.emit(child);
+        }
+        node as u32
+    }
+
+    fn emit_root(&mut self) {
+        let node = self.open(0);
+        for (lane, child) in self.children(0).into_iter().enumerate() {
+            self.grown.nodes[node].children[lane] = self.emit(child);
+            self.grown.cuts.push([self.grown.nodes.len(), self.grown.leaves.len()]);
+        }
+    }
+
+    /// A node with the boxes of its children.
+    fn open(&mut self, at: u32) -> usize {
+        let mut node = Node::EMPTY;
+        for (lane, child) in self.children(at).into_iter().enumerate() {
+            node.set(lane, self.forks[child as usize].span);
+        }
+        node.sort();
+        self.grown.nodes.push(node);
+        self.grown.nodes.len() - 1
+    }
 }
 
 /// Bins along an axis up to `last` go left.
@@ -190,15 +313,15 @@ impl Plane {
 /// How centres fall into bins.
 #[derive(Clone, Copy)]
 struct Bins {
-    low: Vec3,
-    scale: Vec3,
+    low: Vec3A,
+    scale: Vec3A,
     count: usize,
 }
 
 impl Bins {
     #[inline(always)]
     fn of(&self, item: &Item) -> [usize; 3] {
-        let b = (item.centre() - self.low) * self.scale;
+        let b = (item.span().centre() - self.low) * self.scale;
         // Casts saturate, and a width of nothing has scale 0.
         [b.x, b.y, b.z].map(|x| (x as usize).min(self.count - 1))
     }
@@ -210,12 +333,13 @@ fn cheapest(items: &[Item], r: &Range, leaf: usize) -> Option<Plane> {
     let scale =
         |w: f32| if w > 0.0 && w.is_finite() { (count as f32 * 0.9999 / w).min(f32::MAX) } else { 0.0 };
     let bins =
-        Bins { low: r.centres.lo, scale: Vec3::new(scale(width.x), scale(width.y), scale(width.z)), count };
+        Bins { low: r.centres.lo, scale: Vec3A::new(scale(width.x), scale(width.y), scale(width.z)), count };
     let mut spans = [[Span::EMPTY; BINS]; 3];
     let mut counts = [[0usize; BINS]; 3];
     for item in items {
+        let own = item.span();
         for (axis, b) in bins.of(item).into_iter().enumerate() {
-            spans[axis][b].add(item.lo, item.hi);
+            spans[axis][b].join(own);
             counts[axis][b] += 1;
         }
     }
@@ -225,13 +349,13 @@ fn cheapest(items: &[Item], r: &Range, leaf: usize) -> Option<Plane> {
         let (mut right, mut n) = ([(0.0, 0); BINS], 0);
         let mut span = Span::EMPTY;
         for b in (1..count).rev() {
-            span.add(spans[axis][b].lo, spans[axis][b].hi);
+            span.join(spans[axis][b]);
             n += counts[axis][b];
             right[b] = (span.area() * packs(n), n);
         }
         (span, n) = (Span::EMPTY, 0);
         for b in 0..count - 1 {
-            span.add(spans[axis][b].lo, spans[axis][b].hi);
+            span.join(spans[axis][b]);
             n += counts[axis][b];
             let cost = span.area() * packs(n) + right[b + 1].0;
             if n > 0 && right[b + 1].1 > 0 && best.is_none_or(|(c, ..)| cost < c) {

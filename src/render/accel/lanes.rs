@@ -12,12 +12,14 @@ use glam::Vec3A;
 use std::mem::MaybeUninit;
 
 /// Nodes above one another at most; builders halve what is left before they run out.
-pub(super) const DEPTH: usize = 16;
+pub(super) const DEPTH: usize = 54;
+
+const STACK: usize = 7 * DEPTH + 1 + 8;
 
 /// What a walk has put aside: seven siblings a level, and room to write eight at once.
 pub struct Stack {
-    t: [MaybeUninit<f32>; 128],
-    at: [MaybeUninit<u32>; 128],
+    t: [MaybeUninit<f32>; STACK],
+    at: [MaybeUninit<u32>; STACK],
     top: usize,
 }
 
@@ -26,7 +28,11 @@ pub struct Stack {
 impl Stack {
     #[inline(always)]
     pub fn new() -> Self {
-        Self { t: [const { MaybeUninit::uninit() }; 128], at: [const { MaybeUninit::uninit() }; 128], top: 0 }
+        Self {
+            t: [const { MaybeUninit::uninit() }; STACK],
+            at: [const { MaybeUninit::uninit() }; STACK],
+            top: 0,
+        }
     }
 
     #[inline(always)]
@@ -60,8 +66,6 @@ impl Stack {
         Some(item)
     }
 }
-
-const _: () = assert!(7 * DEPTH + 1 + 8 <= 128);
 
 /// A way to do eight things at a time.
 pub trait Lanes: Copy {
@@ -297,7 +301,46 @@ mod avx2 {
 
         #[inline(always)]
         fn meet(pack: &Pack, ray: &Shear<f32>, out: &mut Meetings<f32>) -> u32 {
-            unsafe { meet(pack, ray, out) }
+            unsafe {
+                let (a, b, c) = (corner(pack, 0, ray), corner(pack, 1, ray), corner(pack, 2, ray));
+
+                // Surely missed?
+                let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
+                let above = _mm_or_ps(_mm_or_ps(u.0, v.0), w.0);
+                let below = _mm_or_ps(_mm_or_ps(u.1, v.1), w.1);
+                let ids = _mm_load_ps(pack.ids.as_ptr().cast());
+                const { assert!(EMPTY >> 31 == 1) };
+                let missed = _mm_movemask_ps(_mm_or_ps(_mm_and_ps(above, below), ids));
+                if missed == 15 {
+                    return 0;
+                }
+
+                // The exact edge functions.
+                let u = minor(c[0], b[1], c[1], b[0]);
+                let v = minor(a[0], c[1], a[1], c[0]);
+                let w = minor(b[0], a[1], b[1], a[0]);
+                let zero = _mm256_setzero_pd();
+                let least = _mm256_min_pd(_mm256_min_pd(u, v), w);
+                let most = _mm256_max_pd(_mm256_max_pd(u, v), w);
+                let (below, above) =
+                    (_mm256_cmp_pd::<_CMP_LT_OQ>(least, zero), _mm256_cmp_pd::<_CMP_GT_OQ>(most, zero));
+                let missed = missed | _mm256_movemask_pd(_mm256_and_pd(below, above));
+
+                // Where along the ray.
+                let det = _mm256_add_pd(_mm256_add_pd(u, v), w);
+                let [za, zb, zc] = [_mm256_cvtps_pd(a[2]), _mm256_cvtps_pd(b[2]), _mm256_cvtps_pd(c[2])];
+                let sum = _mm256_add_pd(_mm256_mul_pd(u, za), _mm256_mul_pd(v, zb));
+                let sum = _mm256_add_pd(sum, _mm256_mul_pd(w, zc));
+                let t = _mm256_cvtpd_ps(_mm256_div_pd(sum, _mm256_mul_pd(det, _mm256_set1_pd(ray.depth))));
+                let late = _mm_cmpge_ps(t, _mm_set1_ps(ray.t_min));
+                let range = _mm_movemask_ps(_mm_and_ps(late, _mm_cmple_ps(t, _mm_set1_ps(ray.t_max))));
+                let some = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_NEQ_OQ>(det, zero));
+                _mm256_store_pd(out.v.as_mut_ptr(), v);
+                _mm256_store_pd(out.w.as_mut_ptr(), w);
+                _mm256_store_pd(out.det.as_mut_ptr(), det);
+                _mm_store_ps(out.t.as_mut_ptr(), t);
+                (!missed & range & some) as u32
+            }
         }
     }
 
@@ -307,51 +350,5 @@ mod avx2 {
     fn minor(a: __m128, b: __m128, c: __m128, d: __m128) -> __m256d {
         let cd = _mm256_mul_pd(_mm256_cvtps_pd(c), _mm256_cvtps_pd(d));
         _mm256_fmsub_pd(_mm256_cvtps_pd(a), _mm256_cvtps_pd(b), cd)
-    }
-
-    #[inline]
-    #[target_feature(enable = "avx2,fma")]
-    fn meet(pack: &Pack, ray: &Shear<f32>, out: &mut Meetings<f32>) -> u32 {
-        let (a, b, c) = (corner(pack, 0, ray), corner(pack, 1, ray), corner(pack, 2, ray));
-
-        // Surely missed?
-        let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
-        let above = _mm_or_ps(_mm_or_ps(u.0, v.0), w.0);
-        let below = _mm_or_ps(_mm_or_ps(u.1, v.1), w.1);
-        let ids = unsafe { _mm_load_ps(pack.ids.as_ptr().cast()) };
-        const { assert!(EMPTY >> 31 == 1) };
-        let missed = _mm_movemask_ps(_mm_or_ps(_mm_and_ps(above, below), ids));
-        if missed == 15 {
-            return 0;
-        }
-
-        // The exact edge functions.
-        let u = minor(c[0], b[1], c[1], b[0]);
-        let v = minor(a[0], c[1], a[1], c[0]);
-        let w = minor(b[0], a[1], b[1], a[0]);
-        let zero = _mm256_setzero_pd();
-        let least = _mm256_min_pd(_mm256_min_pd(u, v), w);
-        let most = _mm256_max_pd(_mm256_max_pd(u, v), w);
-        let (below, above) =
-            (_mm256_cmp_pd::<_CMP_LT_OQ>(least, zero), _mm256_cmp_pd::<_CMP_GT_OQ>(most, zero));
-        let missed = missed | _mm256_movemask_pd(_mm256_and_pd(below, above));
-
-        // Where along the ray.
-        let det = _mm256_add_pd(_mm256_add_pd(u, v), w);
-        let [za, zb, zc] = [_mm256_cvtps_pd(a[2]), _mm256_cvtps_pd(b[2]), _mm256_cvtps_pd(c[2])];
-        let sum = _mm256_add_pd(_mm256_mul_pd(u, za), _mm256_mul_pd(v, zb));
-        let sum = _mm256_add_pd(sum, _mm256_mul_pd(w, zc));
-        let t = _mm256_cvtpd_ps(_mm256_div_pd(sum, _mm256_mul_pd(det, _mm256_set1_pd(ray.depth))));
-        let late = _mm_cmpge_ps(t, _mm_set1_ps(ray.t_min));
-        let range = _mm_movemask_ps(_mm_and_ps(late, _mm_cmple_ps(t, _mm_set1_ps(ray.t_max))));
-        let some = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_NEQ_OQ>(det, zero));
-        // Whole fields, aligned.
-        unsafe {
-            _mm256_store_pd(out.v.as_mut_ptr(), v);
-            _mm256_store_pd(out.w.as_mut_ptr(), w);
-            _mm256_store_pd(out.det.as_mut_ptr(), det);
-            _mm_store_ps(out.t.as_mut_ptr(), t);
-        }
-        (!missed & range & some) as u32
     }
 }

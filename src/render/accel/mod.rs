@@ -16,12 +16,14 @@
 
 mod build;
 mod lanes;
+mod packet;
 mod ray;
 mod search;
 mod tree;
 mod triangle;
 mod world;
 
+pub use packet::PACKET;
 pub use ray::{Hit, Ray, Real};
 pub use world::{Motion, Placed, Surface, Updated, World};
 
@@ -32,7 +34,7 @@ use lanes::{Lanes, Machine, Work};
 use ray::Slab;
 use search::{Any, Nearest, Packs, Search};
 use tree::{Node, Visitor};
-use triangle::{EMPTY, Pack, Shear, standing};
+use triangle::{EMPTY, Pack, Vertices, standing};
 
 /// How triangles are found. The answers are the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -49,14 +51,16 @@ const DECAY: f64 = 1.3;
 
 /// The triangles of one surface, ready for rays in the frame of its positions.
 ///
-/// Vertices that are not finite, or beyond 2⁴⁰, are taken to stand at the origin.
+/// Coordinates that are not finite, or beyond 2⁴⁰, are taken for 0.
 #[derive(Clone, Debug)]
 pub struct Accel {
     kind: Kind,
     machine: Machine,
-    triangles: Vec<[u32; 3]>,
+    /// How many.
+    triangles: usize,
     span: Span,
     packs: Vec<Pack>,
+    vertices: Vec<Vertices>,
     nodes: Vec<Node>,
     /// Where the parts below the root end in `nodes` and `packs`.
     cuts: Vec<[usize; 2]>,
@@ -74,14 +78,15 @@ impl Accel {
         let mut accel = Self {
             kind,
             machine: Machine::new(Isa::Best),
-            triangles: triangles.to_vec(),
+            triangles: triangles.len(),
             span: Span::EMPTY,
             packs: Vec::new(),
+            vertices: Vec::new(),
             nodes: Vec::new(),
             cuts: Vec::new(),
             built: 0.0,
         };
-        accel.build(positions, threads);
+        accel.build(positions, triangles, threads);
         accel
     }
 
@@ -90,25 +95,29 @@ impl Accel {
         Self { machine: Machine::new(isa), ..self }
     }
 
-    /// The triangles, as they were given.
-    pub fn triangles(&self) -> &[[u32; 3]] {
-        &self.triangles
+    /// Whether these are the triangles that it was built of: then [`Accel::update`] is enough when vertices move.
+    pub fn is_of(&self, triangles: &[[u32; 3]]) -> bool {
+        let same = |(pack, v): (&Pack, &Vertices)| {
+            let lanes = (0..4).filter(|&lane| pack.ids[lane] != EMPTY);
+            lanes.into_iter().all(|k| triangles[pack.ids[k] as usize] == [v[0][k], v[1][k], v[2][k]])
+        };
+        self.triangles == triangles.len() && self.packs.iter().zip(&self.vertices).all(same)
     }
 
     /// Corner of the box with the smallest coordinates, and with the largest; `None` without triangles.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
-        (!self.triangles.is_empty()).then_some((self.span.lo, self.span.hi))
+        (self.triangles > 0).then_some(self.span.corners())
     }
 
-    fn build(&mut self, positions: &[Vec3], threads: usize) {
+    fn build(&mut self, positions: &[Vec3], triangles: &[[u32; 3]], threads: usize) {
         let corner = |&i: &u32| standing(positions[i as usize]);
         let item = |(id, t): (usize, &[u32; 3])| {
             let [a, b, c] = t.each_ref().map(corner);
-            Item { lo: a.min(b).min(c), hi: a.max(b).max(c), id: id as u32 }
+            Item::new(a.min(b).min(c), a.max(b).max(c), id as u32)
         };
-        let mut items: Vec<Item> = self.triangles.iter().enumerate().map(item).collect();
+        let mut items: Vec<Item> = triangles.iter().enumerate().map(item).collect();
         self.span = Span::EMPTY;
-        items.iter().for_each(|i| self.span.add(i.lo, i.hi));
+        items.iter().for_each(|i| self.span.join(i.span()));
         let leaves = match self.kind {
             Kind::Tree => {
                 let grown = build::grow(&mut items, build::LEAF_SIZE, threads);
@@ -116,13 +125,21 @@ impl Accel {
                 grown.leaves
             }
             Kind::Brute => {
-                let ids: Vec<u32> = (0..self.triangles.len() as u32).collect();
+                let ids: Vec<u32> = (0..self.triangles as u32).collect();
                 let four = |c: &[u32]| std::array::from_fn(|i| c.get(i).copied().unwrap_or(EMPTY));
                 ids.chunks(4).map(four).collect()
             }
         };
-        let triangles = &self.triangles;
-        self.packs = leaves.iter().map(|&ids| Pack::new(positions, triangles, ids)).collect();
+        let known =
+            |ids: &[u32; 4], lane: usize| if ids[lane] == EMPTY { ids[0] } else { ids[lane] } as usize;
+        let corner = |ids: &[u32; 4], c: usize| std::array::from_fn(|lane| triangles[known(ids, lane)][c]);
+        self.vertices = leaves.iter().map(|ids| [corner(ids, 0), corner(ids, 1), corner(ids, 2)]).collect();
+        self.packs = leaves.into_iter().map(Pack::new).collect();
+        const SHARE: usize = 1 << 14;
+        let shares = self.packs.chunks_mut(SHARE).zip(self.vertices.chunks(SHARE));
+        each(shares.collect(), threads, |(packs, vertices)| {
+            packs.iter_mut().zip(vertices).for_each(|(p, v)| _ = p.fill(positions, v));
+        });
         self.built = self.cost();
     }
 
@@ -140,39 +157,47 @@ impl Accel {
         self.refit(positions, threads);
         let rebuild = self.cost() > DECAY * self.built;
         if rebuild {
-            self.build(positions, threads);
+            let triangles = self.list();
+            self.build(positions, &triangles, threads);
         }
         rebuild
     }
 
+    /// The triangles as they were given.
+    fn list(&self) -> Vec<[u32; 3]> {
+        let mut list = vec![[0; 3]; self.triangles];
+        for (pack, v) in self.packs.iter().zip(&self.vertices) {
+            for lane in (0..4).filter(|&lane| pack.ids[lane] != EMPTY) {
+                list[pack.ids[lane] as usize] = [v[0][lane], v[1][lane], v[2][lane]];
+            }
+        }
+        list
+    }
+
     fn refit(&mut self, positions: &[Vec3], threads: usize) {
-        // Cut nodes and leaves where the children of the root end.
-        let triangles = &self.triangles;
+        let vertices = &self.vertices;
+        self.span = Span::EMPTY;
         let Some((root, mut nodes)) = self.nodes.split_first_mut() else {
-            self.packs.iter_mut().for_each(|p| p.fill(positions, triangles));
-            self.span = Span::EMPTY;
-            self.packs.iter().for_each(|p| self.span.add(p.bounds().0, p.bounds().1));
-            return;
+            let each = self.packs.iter_mut().zip(vertices);
+            return each.for_each(|(p, v)| self.span.join(p.fill(positions, v)));
         };
-        let mut packs = &mut self.packs[..];
-        let mut from = [1, 0];
-        let mut parts = Vec::new();
-        for (lane, &to) in self.cuts.iter().enumerate() {
+        // Cut nodes and leaves where the children of the root end; fit each part from its leaves up, then the root.
+        let (mut packs, mut from, mut parts) = (&mut self.packs[..], [1, 0], Vec::new());
+        for (&child, &to) in root.children.iter().zip(&self.cuts) {
             let (own_nodes, rest) = nodes.split_at_mut(to[0] - from[0]);
             let (own_packs, others) = packs.split_at_mut(to[1] - from[1]);
-            parts.push((lane, from, own_nodes, own_packs, Span::EMPTY));
+            parts.push((child, own_nodes, own_packs, from, Span::EMPTY));
             (nodes, packs, from) = (rest, others, to);
         }
-
-        // Fit each part from its leaves up, then the root.
-        each(parts.iter_mut().collect(), threads, |(_, from, nodes, packs, span)| {
-            (span.lo, span.hi) = tree::refit(nodes, packs, *from, |p| {
-                p.fill(positions, triangles);
-                p.bounds()
+        each(parts.iter_mut().collect(), threads, |(child, nodes, packs, from, span)| {
+            *span = tree::refit(*child, nodes, *from, &mut |leaf| {
+                packs[leaf - from[1]].fill(positions, &vertices[leaf])
             });
         });
-        parts.iter().for_each(|(lane, .., span)| root.set(*lane, (span.lo, span.hi)));
-        (self.span.lo, self.span.hi) = root.bounds();
+        for (lane, (.., span)) in parts.into_iter().enumerate() {
+            root.set(lane, span);
+            self.span.join(span);
+        }
     }
 
     /// The first hit that `accept` takes, as [`World::nearest`]; the object is 0.
@@ -192,9 +217,9 @@ impl Accel {
     fn search<S: Lanes, R: Real>(&self, ray: &Ray<R>, object: u32, t_max: f32, search: &mut impl Search<R>) {
         let Some(mut slab) = Slab::new(ray, &self.span, 1.0) else { return };
         slab.t_max = slab.t_max.min(t_max);
-        let mut packs = Packs { packs: &self.packs, shear: Shear::new(ray), object, search };
+        let mut packs = Packs { packs: &self.packs, ray, shear: None, object, search };
         match self.kind {
-            Kind::Tree => tree::walk::<S>(&self.nodes, &slab, &mut packs),
+            Kind::Tree => tree::walk::<S>(&self.nodes, 0, &slab, &mut packs),
             Kind::Brute => {
                 (0..self.packs.len()).fold(slab.t_max, |t, at| packs.leaf::<S>(at as u32, t));
             }

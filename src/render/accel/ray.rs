@@ -56,6 +56,8 @@ mod sealed {
 
     /// What differs between the two.
     pub trait Sealed: Sized {
+        /// Without its sign.
+        fn abs(self) -> Self;
         /// Rounded to nearest.
         fn from_f64(x: f64) -> Self;
         /// `a·b − c·d`, with the sign of the exact value and a relative error of at most 2⁻⁵².
@@ -92,6 +94,10 @@ impl Real for f32 {
 
 impl Sealed for f32 {
     #[inline(always)]
+    fn abs(self) -> Self {
+        f32::abs(self)
+    }
+    #[inline(always)]
     fn from_f64(x: f64) -> Self {
         x as f32
     }
@@ -112,6 +118,10 @@ impl Real for f64 {
 
 impl Sealed for f64 {
     #[inline(always)]
+    fn abs(self) -> Self {
+        f64::abs(self)
+    }
+    #[inline(always)]
     fn from_f64(x: f64) -> Self {
         x
     }
@@ -128,7 +138,7 @@ impl Sealed for f64 {
 }
 
 /// Twice the room for the rounding of origins, slopes and distances: see [`Slab::new`].
-const SLACK: f32 = 24.0 * 0.5 * f32::EPSILON;
+pub(super) const SLACK: f32 = 24.0 * 0.5 * f32::EPSILON;
 
 /// Largest coordinate that is looked at: its products stay finite.
 pub(super) const REACH: f32 = (1u64 << 40) as f32;
@@ -161,12 +171,12 @@ impl Slab {
         let (o, d) = (three(&ray.origin), three(&ray.direction));
         let (size, away) = (d.abs(), o.abs());
         let longest = size.max_element();
-        let near = size.max(away).cmple(Vec3A::splat(REACH)).all() && !(d + o).is_nan();
+        let near = (size.cmple(Vec3A::splat(REACH)) & away.cmple(Vec3A::splat(REACH))).all();
         let (t_min, t_max) = (round(ray.t_min), round(ray.t_max));
-        if !(near && longest >= 1.0 / REACH && t_min.is_finite() && t_max >= t_min) {
+        if !(near & (longest >= 1.0 / REACH) & (t_min.abs() < f32::INFINITY) & (t_max >= t_min)) {
             return None;
         }
-        let reach = (o - Vec3A::from(span.lo)).abs().max((Vec3A::from(span.hi) - o).abs()).max_element();
+        let reach = (o - span.lo).abs().max((span.hi - o).abs()).max_element();
         let slope = Vec3A::ONE / size.max(Vec3A::splat(longest * (0.5f32).powi(30)));
         let off = (Vec3A::splat(SLACK * reach) + away * (0.5 * SLACK)) * slope * slack;
         let slope = slope.copysign(d);

@@ -1,7 +1,7 @@
 //! What is asked of a ray: its first hit, or whether there is one.
 
 use super::lanes::Lanes;
-use super::ray::{Hit, Real, above};
+use super::ray::{Hit, Ray, Real, above};
 use super::tree::Visitor;
 use super::triangle::{Meetings, Pack, Shear};
 
@@ -68,7 +68,9 @@ impl<R: Real, F: Fn(&Hit<R>) -> bool> Search<R> for Any<F> {
 /// The leaves of one surface.
 pub(super) struct Packs<'a, R, Q> {
     pub packs: &'a [Pack],
-    pub shear: Shear<R>,
+    pub ray: &'a Ray<R>,
+    /// Made ready for the first leaf.
+    pub shear: Option<Shear<R>>,
     pub object: u32,
     pub search: &'a mut Q,
 }
@@ -78,7 +80,7 @@ impl<R: Real, Q: Search<R>> Visitor for Packs<'_, R, Q> {
     fn leaf<S: Lanes>(&mut self, leaf: u32, t_max: f32) -> f32 {
         let pack = &self.packs[leaf as usize];
         let mut all = Meetings::new();
-        let mut bits = R::meet::<S>(pack, &self.shear, &mut all);
+        let mut bits = R::meet::<S>(pack, self.shear.get_or_insert_with(|| Shear::new(self.ray)), &mut all);
         if bits == 0 {
             return t_max;
         }

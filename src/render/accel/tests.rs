@@ -88,6 +88,38 @@ fn escapes<R: Real>(rays: usize) -> usize {
 }
 
 #[test]
+fn packets_answer_as_single_rays() {
+    let mut rng = Rng::new(5);
+    let (positions, triangles) = soup(&mut rng, 300);
+    let surface = Surface { positions: &positions, triangles: &triangles };
+    let turn = glam::DAffine3::from_axis_angle(glam::DVec3::Y, 0.7);
+    let moved = Placed { world_from_surface: Some(turn), cull_back: true, ..Placed::default() };
+    let alone = World::new(Kind::Tree, &[surface], &[Placed::default()], 1);
+    let two = World::new(Kind::Tree, &[surface], &[Placed::default(), moved], 1);
+    let mut blocked = 0;
+    for k in 0..1000 {
+        // Towards a lamp, away from one, side by side, and all over the place; some too few to fill a packet.
+        let (lamp, centre, spread) = (rng.point(3.0), rng.point(1.0), rng.span(0.0, 0.3));
+        let rays: Vec<Ray<f32>> = (0..rng.below(PACKET) + 1)
+            .map(|_| {
+                let o = centre + rng.point(spread);
+                let d = [lamp - o, o - lamp, lamp, rng.point(1.0)][k % 4];
+                let t_max = if k % 8 < 5 { 1.0 } else { f32::INFINITY };
+                Ray { origin: o.into(), direction: d.into(), t_min: 0.0, t_max }
+            })
+            .collect();
+        for world in [&alone, &two] {
+            let accept = |i: usize, h: &Hit<f32>| (h.triangle as usize + i) % 7 > 0;
+            let want = |(i, r): (usize, &Ray<f32>)| (world.blocked(r, |h| accept(i, h)) as u32) << i;
+            let want: u32 = rays.iter().enumerate().map(want).sum();
+            assert_eq!(world.blocked_packet(&rays, accept), want, "{rays:?}");
+            blocked += want.count_ones();
+        }
+    }
+    assert!((2000..14000).contains(&blocked), "{blocked}");
+}
+
+#[test]
 fn no_ray_gets_out_of_a_closed_surface() {
     assert_eq!((escapes::<f32>(100_000), escapes::<f64>(20_000)), (0, 0));
 }

@@ -1,9 +1,10 @@
 //! A tree of boxes, eight to a node; what its leaves are is the caller's business.
 
+use super::build::Span;
 use super::lanes::{Lanes, Stack};
 use super::ray::Slab;
 use crate::math::simd::F8;
-use glam::Vec3;
+use glam::Vec3A;
 
 /// A child that is a leaf; the other bits say which.
 pub(super) const LEAF: u32 = 1 << 31;
@@ -28,7 +29,8 @@ impl Node {
 
     /// Put a child's box into its lane.
     #[inline(always)]
-    pub fn set(&mut self, lane: usize, (lo, hi): (Vec3, Vec3)) {
+    pub fn set(&mut self, lane: usize, span: Span) {
+        let (lo, hi) = (span.lo.to_array(), span.hi.to_array());
         for k in 0..3 {
             self.planes[k].0[lane] = lo[k];
             self.planes[k + 3].0[lane] = hi[k];
@@ -53,32 +55,20 @@ impl Node {
     }
 
     /// The box of one child.
-    pub fn get(&self, lane: usize) -> (Vec3, Vec3) {
+    pub fn get(&self, lane: usize) -> Span {
         let at = |k: usize| self.planes[k].0[lane];
-        (Vec3::new(at(0), at(1), at(2)), Vec3::new(at(3), at(4), at(5)))
-    }
-
-    /// The box of all children.
-    #[inline(always)]
-    pub fn bounds(&self) -> (Vec3, Vec3) {
-        let fold = |k: usize, f: fn(f32, f32) -> f32| {
-            let p = &self.planes[k].0;
-            let four: [f32; 4] = std::array::from_fn(|i| f(p[i], p[i + 4]));
-            f(f(four[0], four[2]), f(four[1], four[3]))
-        };
-        let low = |k| fold(k, |a, b| if a < b { a } else { b });
-        let high = |k| fold(k, |a, b| if a > b { a } else { b });
-        (Vec3::new(low(0), low(1), low(2)), Vec3::new(high(3), high(4), high(5)))
+        Span { lo: Vec3A::new(at(0), at(1), at(2)), hi: Vec3A::new(at(3), at(4), at(5)) }
     }
 
     /// Half the area of all children together: the chance that a ray has to look at them.
     #[inline(always)]
     pub fn cost(&self) -> f64 {
         let p = &self.planes;
-        let [x, y, z] = [0, 1, 2].map(|k| p[k + 3] - p[k]);
-        let area = x * y + y * z + z * x;
-        let full = |i: usize| if self.is_empty(i) { 0.0 } else { area.0[i] as f64 };
-        (0..8).map(full).sum()
+        let side = |k: usize| (p[k + 3] - p[k]).max(F8::ZERO);
+        let (x, y, z) = (side(0), side(1), side(2));
+        let area = (x * y + y * z + z * x).0;
+        let four: [f32; 4] = std::array::from_fn(|i| area[i] + area[i + 4]);
+        ((four[0] + four[2]) + (four[1] + four[3])) as f64
     }
 
     /// Which children a ray enters before `t_max`, and where.
@@ -99,15 +89,14 @@ pub(super) trait Visitor {
     fn leaf<S: Lanes>(&mut self, leaf: u32, t_max: f32) -> f32;
 }
 
-/// Visit the leaves that a ray enters, about nearest first.
+/// Visit the leaves below a node that a ray enters, about nearest first.
 #[inline(always)]
-pub(super) fn walk<S: Lanes>(nodes: &[Node], slab: &Slab, visitor: &mut impl Visitor) {
+pub(super) fn walk<S: Lanes>(nodes: &[Node], mut at: u32, slab: &Slab, visitor: &mut impl Visitor) {
     if nodes.is_empty() {
         return;
     }
     let (ray, mut t_max) = (S::ray(slab), slab.t_max);
     let mut stack = Stack::new();
-    let mut at = 0;
     loop {
         if at & LEAF == 0 {
             if let Some(child) = S::enter(&nodes[at as usize], &ray, t_max, &mut stack) {
@@ -127,26 +116,24 @@ pub(super) fn walk<S: Lanes>(nodes: &[Node], slab: &Slab, visitor: &mut impl Vis
     }
 }
 
-/// Fit boxes from the leaves up. `nodes` and `leaves` begin at `from` in the whole; `fit` gives a leaf's box. Gives the box
-/// around all, which is what the first node, or the only leaf, is in.
-pub(super) fn refit<L>(
+/// Fit boxes from the leaves up. `nodes` begin at `from` in the whole; `fit` gives a leaf's box. Gives the box of `at`.
+pub(super) fn refit(
+    at: u32,
     nodes: &mut [Node],
-    leaves: &mut [L],
     from: [usize; 2],
-    mut fit: impl FnMut(&mut L) -> (Vec3, Vec3),
-) -> (Vec3, Vec3) {
-    for at in (0..nodes.len()).rev() {
-        for lane in 0..8 {
-            let child = nodes[at].children[lane];
-            let span = if nodes[at].is_empty(lane) {
-                continue;
-            } else if child & LEAF != 0 {
-                fit(&mut leaves[(child & !LEAF) as usize - from[1]])
-            } else {
-                nodes[child as usize - from[0]].bounds()
-            };
-            nodes[at].set(lane, span);
+    fit: &mut impl FnMut(usize) -> Span,
+) -> Span {
+    if at & LEAF != 0 {
+        return fit((at & !LEAF) as usize);
+    }
+    let own = at as usize - from[0];
+    let mut all = Span::EMPTY;
+    for lane in 0..8 {
+        if !nodes[own].is_empty(lane) {
+            let span = refit(nodes[own].children[lane], nodes, from, fit);
+            nodes[own].set(lane, span);
+            all.join(span);
         }
     }
-    nodes.first().map_or_else(|| fit(&mut leaves[0]), Node::bounds)
+    all
 }

@@ -5,8 +5,9 @@
 //! a ray. Edge functions in the ray's own precision only sort out what is surely missed: `fl(ab) > fl(cd)` implies `ab > cd`.
 //! What remains is computed once more with exact products, so that `t` and the weights are as good for slivers.
 
+use super::build::Span;
 use super::ray::{Hit, REACH, Ray, Real};
-use glam::Vec3;
+use glam::{Mat4, Vec3, Vec3A};
 
 /// A ray as triangles see it.
 #[derive(Clone, Copy, Debug)]
@@ -22,16 +23,20 @@ pub struct Shear<R> {
     pub t_max: R,
 }
 
+/// The axis after an axis, round and round.
+const NEXT: [usize; 4] = [1, 2, 0, 1];
+
 impl<R: Real> Shear<R> {
     #[inline(always)]
     pub fn new(ray: &Ray<R>) -> Self {
-        let d = ray.direction;
-        let along = |k: usize| Into::<f64>::into(d[k]).abs();
-        let size = [along(0), along(1), along(2)];
-        let z = if size[0] > size[1] && size[0] > size[2] { 0 } else { 1 + (size[1] <= size[2]) as usize };
-        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
+        let d = &ray.direction;
+        // Without branches: the longest axis of a stray ray cannot be predicted.
+        let (x, y, z) = (d[0].abs(), d[1].abs(), d[2].abs());
+        let (last, middle) = ((z >= x && z >= y) as usize, (y > x) as usize);
+        let z = 2 * last + (1 - last) * middle;
         // A reflected frame would turn the winding round.
-        let axes = if Into::<f64>::into(d[z]) < 0.0 { [y, x, z] } else { [x, y, z] };
+        let swap = (d[z] < R::from(0.0)) as usize;
+        let axes = [NEXT[z + swap], NEXT[z + 1 - swap], z];
         Self {
             origin: ray.origin,
             axes,
@@ -120,28 +125,32 @@ pub struct Pack {
     pub ids: [u32; 4],
 }
 
+/// Which vertices the corners of a pack are: corner, triangle. In the order of the packs, so that fitting them again reads on.
+pub(super) type Vertices = [[u32; 4]; 3];
+
 /// No triangle.
 pub(super) const EMPTY: u32 = u32::MAX;
 
 impl Pack {
-    /// Of up to four triangles of a mesh.
-    #[inline(always)]
-    pub fn new(positions: &[Vec3], triangles: &[[u32; 3]], ids: [u32; 4]) -> Self {
-        let mut pack = Self { corners: [[[0.0; 4]; 3]; 3], ids };
-        pack.fill(positions, triangles);
-        pack
+    /// Of up to four triangles.
+    pub fn new(ids: [u32; 4]) -> Self {
+        Self { corners: [[[0.0; 4]; 3]; 3], ids }
     }
 
-    /// Take the corners from where they stand now.
+    /// Take the corners from where they stand now; gives the box around them.
     #[inline(always)]
-    pub fn fill(&mut self, positions: &[Vec3], triangles: &[[u32; 3]]) {
-        for lane in 0..4 {
-            let id = if self.ids[lane] == EMPTY { self.ids[0] } else { self.ids[lane] };
-            for (corner, &i) in self.corners.iter_mut().zip(&triangles[id as usize]) {
-                let p = standing(positions[i as usize]);
-                (corner[0][lane], corner[1][lane], corner[2][lane]) = (p.x, p.y, p.z);
-            }
+    pub fn fill(&mut self, positions: &[Vec3], vertices: &Vertices) -> Span {
+        let mut span = Span::EMPTY;
+        for c in 0..3 {
+            let p: [Vec3A; 4] = std::array::from_fn(|lane| standing(positions[vertices[c][lane] as usize]));
+            span.lo = span.lo.min(p[0].min(p[1])).min(p[2].min(p[3]));
+            span.hi = span.hi.max(p[0].max(p[1])).max(p[2].max(p[3]));
+            let rows =
+                Mat4::from_cols(p[0].extend(0.0), p[1].extend(0.0), p[2].extend(0.0), p[3].extend(0.0));
+            let rows = rows.transpose();
+            self.corners[c] = [rows.x_axis.to_array(), rows.y_axis.to_array(), rows.z_axis.to_array()];
         }
+        span
     }
 
     /// The corners of one triangle.
@@ -149,24 +158,6 @@ impl Pack {
     pub fn corners_of(&self, lane: usize) -> [[f32; 3]; 3] {
         let at = |c: usize| [self.corners[c][0][lane], self.corners[c][1][lane], self.corners[c][2][lane]];
         [at(0), at(1), at(2)]
-    }
-
-    /// Its box.
-    #[inline(always)]
-    pub fn bounds(&self) -> (Vec3, Vec3) {
-        let c = &self.corners;
-        let axis = |k: usize| {
-            let (mut lo, mut hi) = (c[0][k], c[0][k]);
-            for corner in &c[1..] {
-                for lane in 0..4 {
-                    lo[lane] = lo[lane].min(corner[k][lane]);
-                    hi[lane] = hi[lane].max(corner[k][lane]);
-                }
-            }
-            (lo.into_iter().reduce(f32::min).unwrap_or(0.0), hi.into_iter().reduce(f32::max).unwrap_or(0.0))
-        };
-        let [x, y, z] = [0, 1, 2].map(axis);
-        (Vec3::new(x.0, y.0, z.0), Vec3::new(x.1, y.1, z.1))
     }
 
     /// Which of the four are hit in `t_min…t_max`, a bit each.
@@ -185,8 +176,10 @@ impl Pack {
     }
 }
 
-/// Where a vertex is taken to stand: at the origin if it is nowhere, or too far for its products to be finite.
+/// Where a vertex is taken to stand: coordinates that are nowhere, or too far for products to be finite, are taken for 0.
 #[inline(always)]
-pub(super) fn standing(p: Vec3) -> Vec3 {
-    if p.abs().cmple(Vec3::splat(REACH)).all() { p } else { Vec3::ZERO }
+pub(super) fn standing(p: Vec3) -> Vec3A {
+    let p = Vec3A::from(p);
+    // Comparisons with NaN are false.
+    Vec3A::select(p.abs().cmple(Vec3A::splat(REACH)), p, Vec3A::ZERO)
 }

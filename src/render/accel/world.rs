@@ -1,6 +1,7 @@
 //! Many surfaces, each as often as it is placed: a tree over objects, and a tree in each surface.
 
 use super::lanes::{Lanes, Machine, Work};
+use super::packet::{PACKET, Together};
 use super::ray::{Hit, Ray, Real, Slab};
 use super::search::{Any, Nearest, Search};
 use super::{Accel, Kind, build, each, tree};
@@ -60,10 +61,10 @@ pub struct Updated {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Object {
-    placed: Placed,
+pub(super) struct Object {
+    pub placed: Placed,
     /// Inverse of the placement, if that has one.
-    surface_from_world: Option<DAffine3>,
+    pub surface_from_world: Option<DAffine3>,
     /// Backs are fronts.
     flipped: bool,
 }
@@ -72,14 +73,14 @@ struct Object {
 #[derive(Clone, Debug)]
 pub struct World {
     machine: Machine,
-    parts: Vec<Accel>,
-    objects: Vec<Object>,
-    span: Span,
+    pub(super) parts: Vec<Accel>,
+    pub(super) objects: Vec<Object>,
+    pub(super) span: Span,
     /// How much wider boxes are made for rays: placements round, too.
-    slack: f32,
-    nodes: Vec<Node>,
+    pub(super) slack: f32,
+    pub(super) nodes: Vec<Node>,
     /// The objects of each leaf of `nodes`.
-    leaves: Vec<[u32; build::LEAF_SIZE]>,
+    pub(super) leaves: Vec<[u32; build::LEAF_SIZE]>,
 }
 
 impl World {
@@ -120,7 +121,7 @@ impl World {
 
     /// Corner of the box around all objects with the smallest coordinates, and with the largest.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
-        (!self.nodes.is_empty()).then_some((self.span.lo, self.span.hi))
+        (!self.nodes.is_empty()).then_some(self.span.corners())
     }
 
     /// Follow what has moved: a deformed surface is fitted again (or built anew, see [`Accel::update`]), a moved object costs
@@ -156,11 +157,11 @@ impl World {
             if self.objects.iter().any(|o| o.placed.world_from_surface.is_some()) { 16.0 } else { 1.0 };
         let item = |(id, o): (usize, &Object)| {
             let (lo, hi) = o.bounds(self.parts[o.placed.surface].bounds()?)?;
-            Some(Item { lo, id: id as u32, hi })
+            Some(Item::new(lo.into(), hi.into(), id as u32))
         };
         let mut items: Vec<Item> = self.objects.iter().enumerate().filter_map(item).collect();
         self.span = Span::EMPTY;
-        items.iter().for_each(|i| self.span.add(i.lo, i.hi));
+        items.iter().for_each(|i| self.span.join(i.span()));
         let grown = build::grow(&mut items, 1, 1);
         (self.nodes, self.leaves) = (grown.nodes, grown.leaves);
     }
@@ -178,13 +179,23 @@ impl World {
     pub fn blocked<R: Real>(&self, ray: &Ray<R>, accept: impl Fn(&Hit<R>) -> bool) -> bool {
         self.machine.run(Query { world: self, ray, search: Any::new(accept) }).found
     }
+
+    /// Which of up to [`PACKET`] rays `accept` (given which ray it is) takes a hit of, a bit each: the answers of
+    /// [`World::blocked`], sooner if the rays go much the same way, as to one lamp.
+    ///
+    /// # Panics
+    /// If there are more rays.
+    pub fn blocked_packet(&self, rays: &[Ray<f32>], accept: impl Fn(usize, &Hit<f32>) -> bool) -> u32 {
+        assert!(rays.len() <= PACKET, "{} rays in a packet of {PACKET}", rays.len());
+        self.machine.run(Together { world: self, rays, accept: &accept })
+    }
 }
 
 /// A search among all objects.
-struct Query<'a, R, Q> {
-    world: &'a World,
-    ray: &'a Ray<R>,
-    search: Q,
+pub(super) struct Query<'a, R, Q> {
+    pub world: &'a World,
+    pub ray: &'a Ray<R>,
+    pub search: Q,
 }
 
 impl<R: Real, Q: Search<R>> Work for Query<'_, R, Q> {
@@ -197,7 +208,7 @@ impl<R: Real, Q: Search<R>> Work for Query<'_, R, Q> {
             let mut own = Own { object: &world.objects[0], search: &mut self.search };
             world.parts[placed.surface].search::<S, R>(self.ray, 0, f32::INFINITY, &mut own);
         } else if let Some(slab) = Slab::new(self.ray, &world.span, world.slack) {
-            tree::walk::<S>(&world.nodes, &slab, &mut self);
+            tree::walk::<S>(&world.nodes, 0, &slab, &mut self);
         }
         self.search
     }
@@ -216,9 +227,9 @@ impl<R: Real, Q: Search<R>> Visitor for Query<'_, R, Q> {
 }
 
 /// A search that sees the hits of one object as they are in the world.
-struct Own<'a, Q> {
-    object: &'a Object,
-    search: &'a mut Q,
+pub(super) struct Own<'a, Q> {
+    pub object: &'a Object,
+    pub search: &'a mut Q,
 }
 
 impl<R: Real, Q: Search<R>> Search<R> for Own<'_, Q> {
@@ -259,7 +270,7 @@ impl Object {
 
     /// A ray in the frame of the surface; `t` stays what it is.
     #[inline(always)]
-    fn own<R: Real>(&self, ray: &Ray<R>) -> Ray<R> {
+    pub fn own<R: Real>(&self, ray: &Ray<R>) -> Ray<R> {
         let Some(m) = self.surface_from_world else { return *ray };
         let wide = |v: [R; 3]| DVec3::from_array(v.map(Into::into));
         let (o, d) = (m.transform_point3(wide(ray.origin)), m.transform_vector3(wide(ray.direction)));

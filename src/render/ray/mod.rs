@@ -376,7 +376,7 @@ fn follow<'w>(world: &'w mut Option<World>, bodies: &[Body], threads: usize) -> 
     let same = |w: &World| {
         w.objects().zip(bodies).all(|(p, b)| p.mirrored == b.mirrored)
             && w.surfaces().len() == bodies.len()
-            && w.surfaces().iter().zip(bodies).all(|(s, b)| s.triangles() == b.triangles)
+            && w.surfaces().iter().zip(bodies).all(|(s, b)| s.is_of(b.triangles))
     };
     let kept = world.take().filter(same);
     world.insert(match kept {
