@@ -183,7 +183,7 @@ fn both_kinds_of_stl_give_the_same_triangles() {
     assert_eq!(words("solid\nquad"), "STL text, line 2: expected `facet normal` or `endsolid`, found `quad`");
     assert!(
         words(
-            "solid\nfacet normal 0 0 0 outer loop vertex nan 0 0 vertex 0 0 0 vertex 0 0 0 endloop endfacet"
+            "solid\nfacet normal 0 0 0 outer loop vertex nan 0 0 vertex 0 0 0 vertex 0 0 0 endloop endfacet\nendsolid"
         )
         .contains("finite")
     );
@@ -387,8 +387,7 @@ fn rays_cover_what_their_channels_say() {
         differ += usize::from(there != (p[3] > 0));
     }
     assert!(covered > 1000);
-    // Channels may look at more samples than the one at the pixel's centre.
-    assert!(differ * 8 < covered, "{differ} of {covered}");
+    assert_eq!(differ, 0, "of {covered}");
 }
 
 #[test]

@@ -173,7 +173,7 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
     let alone = plan.frames.len() == 1 && !one_picture;
     let settings =
         args.sheet.settings(args.output.settings(usual_size(task.import), args.renderer.coverage())?)?;
-    let settings = Settings { threads: if alone { threads } else { 1 }, ..settings };
+    let mut settings = Settings { threads: if alone { threads } else { 1 }, ..settings };
     let look = args.look.look(asset, scene.map(|s| &s.look), |m| say.warn(m))?;
     let renderer =
         args.renderer.renderer(&look, &props, scene, args.sheet.pixels.is_on(), args.look.has_shadows())?;
@@ -182,6 +182,10 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
             "the rasterizer leaves {} shapes out; --renderer ray draws them",
             props.shapes.len()
         ));
+    }
+    if renderer.rays().is_some_and(|r| r.samples <= 1) {
+        // Channels look where the picture does.
+        settings.samples = 1;
     }
     let desc = ShotDesc {
         renderer,
