@@ -1,0 +1,166 @@
+//! `sinew bake`: curves to curves within an error.
+
+use super::{Failure, load, print, say::Say};
+use serde_json::{Map, Value, json};
+use sinew::bake::{self, BakeDesc, BakeError, Baked, Gauge};
+use sinew::clip::Clip;
+use sinew::io::picture::{AtomicFile, Folder};
+use sinew::io::{self, Import, Options, gltf};
+use std::path::{Path, PathBuf};
+
+const EXAMPLES: &str = "\
+Examples:
+  sinew bake fox.glb -o small.glb                       0.01% of the character's diagonal
+  sinew bake fox.glb -o small.glb --tolerance 0.5mm
+  sinew bake fox.glb -o run.gltf --clip Run --json
+
+No vertex of the skin moves by more than the tolerance, at any time: at keys, at frames and between them. What was reached is printed
+and written into asset.extras.sinew. Everything but the animations is carried through untouched. Where the bound cannot be kept, nothing is
+written and the exit code is 4.";
+
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// A glTF file (.gltf, .glb).
+    input: PathBuf,
+    /// Where the result goes: .glb, or .gltf with a .bin beside it.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// How far any vertex may be off: metres (0.001, 1m, 2cm, 0.5mm) or a part of the rest pose's diagonal (0.02%).
+    #[arg(long, value_name = "LENGTH|PERCENT", default_value = "0.01%", value_parser = tolerance)]
+    tolerance: Tolerance,
+    /// Only this clip, by name or index; all of them by default.
+    #[arg(long, value_name = "NAME|INDEX")]
+    clip: Option<String>,
+    /// Keep rotations as 32-bit floating point.
+    #[arg(long)]
+    no_quantize: bool,
+    /// Worker threads; one a core by default. The result does not depend on them.
+    #[arg(long, value_name = "N")]
+    threads: Option<std::num::NonZeroUsize>,
+    /// Overwrite an existing file.
+    #[arg(short, long)]
+    force: bool,
+    /// Print the report as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy)]
+enum Tolerance {
+    Metres(f64),
+    OfDiagonal(f64),
+}
+
+fn tolerance(text: &str) -> Result<Tolerance, String> {
+    let units = [("%", 0.01), ("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("", 1.0)];
+    let (unit, scale) = units.into_iter().find(|u| text.ends_with(u.0)).expect("the last fits all");
+    let number = text[..text.len() - unit.len()].trim().parse::<f64>();
+    match number.map(|n| n * scale) {
+        Ok(n) if n > 0.0 && n.is_finite() && unit == "%" => Ok(Tolerance::OfDiagonal(n)),
+        Ok(n) if n > 0.0 && n.is_finite() => Ok(Tolerance::Metres(n)),
+        _ => Err("expected a length above 0 (0.5mm, 2cm, 0.001) or a part of the diagonal (0.02%)".into()),
+    }
+}
+
+pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
+    let import = load(&args.input, Options::default(), say)?;
+    if import.format != "glTF" {
+        let message = format!("{}: baking reads glTF files; this is a {}", args.input.display(), import.format);
+        return Err(Failure::Usage(message));
+    }
+    let clips = import.asset.character.clips();
+    let chosen: Vec<usize> = match super::find_clip(&import, args.clip.as_deref())? {
+        Some(one) if args.clip.is_some() => vec![one],
+        _ => (0..clips.len()).collect(),
+    };
+    if chosen.is_empty() {
+        return Err(Failure::Input(format!("{}: there are no clips to bake", args.input.display())));
+    }
+    let threads = args.threads.map_or_else(|| std::thread::available_parallelism().map_or(1, Into::into), Into::into);
+    let diagonal = Gauge::new(&import.asset.character, threads).diagonal();
+    let metres = match args.tolerance {
+        Tolerance::Metres(m) => m,
+        Tolerance::OfDiagonal(part) => part * diagonal,
+    };
+    let desc = BakeDesc { tolerance: metres, quantize: !args.no_quantize, threads };
+    let bar = say.progress(chosen.len());
+    let mut baked = vec![];
+    for &c in &chosen {
+        baked.push(bake::bake(&import.asset.character, &clips[c], &desc).map_err(|e| match e {
+            BakeError::Missed { .. } => Failure::Differs(format!("{}: {e}", args.input.display())),
+            BakeError::Tolerance { .. } => Failure::Usage(format!("{}: {e}", args.input.display())),
+        })?);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let report = report(&import, &chosen, &baked, metres, diagonal);
+    write(args, &import, &chosen, &baked, &report)?;
+    if args.json {
+        return print(format!("{:#}\n", report).as_bytes());
+    }
+    for (&c, b) in chosen.iter().zip(&baked) {
+        say.note(&line(&import, &clips[c], b, diagonal));
+    }
+    say.note(&format!("wrote {}", args.output.display()));
+    Ok(())
+}
+
+fn bone_of(import: &Import, b: &Baked) -> String {
+    let (character, worst) = (&import.asset.character, b.report.worst);
+    let bone = character.instances().get(worst.instance).and_then(|_| character.bones_of(worst.instance, worst.vertex).next());
+    bone.map_or_else(String::new, |b| character.skeleton().name(b).into())
+}
+
+fn line(import: &Import, clip: &Clip, b: &Baked, diagonal: f64) -> String {
+    let r = &b.report;
+    format!(
+        "{}: {} → {} keys, {} → {} bytes; at most {:.4} mm off ({:.4}% of the diagonal), at {:.3} s on {}",
+        super::say::name(&clip.name),
+        r.keys[0],
+        r.keys[1],
+        r.bytes[0],
+        r.bytes[1],
+        1e3 * r.ceiling,
+        100.0 * r.ceiling / diagonal.max(1e-30),
+        r.worst.time,
+        super::say::name(&bone_of(import, b)),
+    )
+}
+
+fn report(import: &Import, chosen: &[usize], baked: &[Baked], metres: f64, diagonal: f64) -> Value {
+    let clips = chosen.iter().zip(baked).map(|(&c, b)| {
+        let r = &b.report;
+        json!({
+            "clip": import.asset.character.clips()[c].name,
+            "error": r.ceiling,
+            "measured": r.worst.distance,
+            "worst": {"time": r.worst.time, "instance": r.worst.instance, "vertex": r.worst.vertex, "bone": bone_of(import, b)},
+            "moments": r.moments,
+            "keys": r.keys,
+            "bytes": r.bytes,
+        })
+    });
+    json!({"tolerance": metres, "diagonal": diagonal, "metric": "vertices", "clips": clips.collect::<Vec<_>>()})
+}
+
+fn write(args: &Args, import: &Import, chosen: &[usize], baked: &[Baked], report: &Value) -> Result<(), Failure> {
+    let bad = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", args.input.display()));
+    let bytes = io::read_file(&args.input).map_err(|e| bad(&e))?;
+    let folder = args.input.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let clips: Vec<gltf::NewClip> =
+        baked.iter().zip(chosen).map(|(b, &c)| gltf::NewClip { clip: &b.clip, short: &b.short, replaces: Some(c) }).collect();
+    let extras = Map::from_iter([("sinew".to_owned(), report.clone())]);
+    let name = args.input.display().to_string();
+    let out = gltf::with_clips(&bytes, Some(folder), &name, import, &clips, extras).map_err(|e| bad(&e))?;
+    let put = |path: &Path, bytes: &[u8]| {
+        AtomicFile::write(path, bytes, args.force, Folder::MustExist).map_err(|e| Failure::Run(e.to_string()))
+    };
+    if args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf")) {
+        let bin = args.output.with_extension("bin");
+        let uri = bin.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        put(&bin, &out.bin)?;
+        return put(&args.output, &out.gltf(&uri));
+    }
+    put(&args.output, &out.glb())
+}
