@@ -208,7 +208,8 @@ impl Character {
             Binding::Bone(b) => (Some(*b), None),
             Binding::Skin { palette, weights } => (None, Some((palette, weights))),
         };
-        let skinned = many.into_iter().flat_map(move |(p, w)| w.of(vertex).map(|(b, weight)| (p[b].0, weight)));
+        let skinned =
+            many.into_iter().flat_map(move |(p, w)| w.of(vertex).map(|(b, weight)| (p[b].0, weight)));
         one.into_iter().chain(skinned.filter(|s| s.1 > 0.0).map(|s| s.0))
     }
 

@@ -26,6 +26,16 @@ impl Worst {
     }
 }
 
+/// What errors of a bone's channels cost.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Lever {
+    /// Metres a radian: the distance from its origin to the farthest vertex that it or a bone below it moves; zero where it moves
+    /// nothing.
+    pub turn: f64,
+    /// Metres a unit of translation: the scale of the frame that it stands in.
+    pub shift: f64,
+}
+
 /// Buffers of one thread.
 #[derive(Default)]
 struct Bench {
@@ -72,7 +82,11 @@ impl<'a> Gauge<'a> {
     }
 
     /// Work on every time, on all threads, results in order.
-    fn each<T: Send + Default + Clone>(&self, times: &[f64], work: impl Fn(&mut Bench, f64) -> T + Sync) -> Vec<T> {
+    fn each<T: Send + Default + Clone>(
+        &self,
+        times: &[f64],
+        work: impl Fn(&mut Bench, f64) -> T + Sync,
+    ) -> Vec<T> {
         let threads = self.threads.min(times.len()).max(1);
         let share = times.len().div_ceil(8 * threads).max(1);
         let mut out = vec![T::default(); times.len()];
@@ -82,7 +96,8 @@ impl<'a> Gauge<'a> {
             return out;
         }
         let next = AtomicUsize::new(0);
-        let chunks: Vec<_> = out.chunks_mut(share).zip(times.chunks(share)).map(std::sync::Mutex::new).collect();
+        let chunks: Vec<_> =
+            out.chunks_mut(share).zip(times.chunks(share)).map(std::sync::Mutex::new).collect();
         std::thread::scope(|s| {
             for _ in 0..threads {
                 s.spawn(|| {
@@ -125,15 +140,18 @@ impl<'a> Gauge<'a> {
         worst
     }
 
-    /// For each bone, the longest distance from its origin to a vertex that it or a bone below it moves, metres, over these times
-    /// of a clip: what a radian of error there costs. Zero where it moves nothing.
-    pub fn levers(&self, clip: &Clip, times: &[f64]) -> Vec<f64> {
-        let bones = self.character.skeleton().len();
-        let found = self.each(times, |bench, t| self.levers_at(clip, t, bench));
-        (0..bones).map(|b| found.iter().map(|l| l[b]).fold(0.0, f64::max)).collect()
+    /// The lever of each bone over these times of a clip.
+    pub fn levers(&self, clip: &Clip, times: &[f64]) -> Vec<Lever> {
+        let mut longest = vec![Lever::default(); self.character.skeleton().len()];
+        for at in self.each(times, |bench, t| self.levers_at(clip, t, bench)) {
+            for (l, now) in longest.iter_mut().zip(at) {
+                *l = Lever { turn: l.turn.max(now.turn), shift: l.shift.max(now.shift) };
+            }
+        }
+        longest
     }
 
-    fn levers_at(&self, clip: &Clip, t: f64, bench: &mut Bench) -> Vec<f64> {
+    fn levers_at(&self, clip: &Clip, t: f64, bench: &mut Bench) -> Vec<Lever> {
         let c = self.character;
         let skeleton = c.skeleton();
         let pose = self.pose(clip, t);
@@ -161,11 +179,13 @@ impl<'a> Gauge<'a> {
         let reach = |bone: crate::skeleton::BoneId| {
             let [lo, hi] = boxes[bone.index()];
             if lo.x > hi.x {
-                return 0.0;
+                return Lever::default();
             }
             let origin: DVec3 = bench.posed.origin(bone) - center;
             let far = (lo.as_dvec3() - origin).abs().max((hi.as_dvec3() - origin).abs());
-            far.length()
+            let parent = skeleton.parent(bone).map(|p| bench.posed.world_from_bone(p).matrix3);
+            let stretch = |m: glam::DMat3| m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
+            Lever { turn: far.length(), shift: parent.map_or(1.0, stretch) }
         };
         skeleton.ids().map(reach).collect()
     }

@@ -9,7 +9,7 @@ mod gauge;
 mod plan;
 mod times;
 
-pub use gauge::{Gauge, Worst};
+pub use gauge::{Gauge, Lever, Worst};
 
 use crate::character::Character;
 use crate::clip::Clip;

@@ -47,16 +47,22 @@ pub(super) struct Plan<'a> {
 impl<'a> Plan<'a> {
     pub fn new(character: &Character, clip: &'a Clip, gauge: &Gauge, desc: &BakeDesc) -> Self {
         let levers = gauge.levers(clip, &times::coarse(clip, LEVER_MOMENTS));
-        let longest = levers.iter().copied().fold(0.0, f64::max);
+        let longest = levers.iter().map(|l| l.turn).fold(0.0, f64::max);
         let rest = character.rest_pose();
         let targets = character.target_reach();
         let vertices = character.instances().iter().map(|i| character.mesh(i).positions.len()).sum();
         let mut jobs: Vec<Job> = vec![];
         for track in &clip.tracks {
-            let at = |b: crate::skeleton::BoneId| levers[b.index()].max(0.02 * longest).max(1e-9);
+            let at = |b: crate::skeleton::BoneId| levers[b.index()].turn.max(0.02 * longest).max(1e-9);
             let (kind, lever, rest) = match track.target {
-                Target::Rotation(b) => (Kind::Rotation, at(b), rest.locals[b.index()].rotation.to_array().to_vec()),
-                Target::Translation(b) => (Kind::Vector, 1.0, rest.locals[b.index()].translation.to_array().to_vec()),
+                Target::Rotation(b) => {
+                    (Kind::Rotation, at(b), rest.locals[b.index()].rotation.to_array().to_vec())
+                }
+                Target::Translation(b) => (
+                    Kind::Vector,
+                    levers[b.index()].shift.max(1e-9),
+                    rest.locals[b.index()].translation.to_array().to_vec(),
+                ),
                 Target::Scale(b) => (Kind::Vector, at(b), rest.locals[b.index()].scale.to_array().to_vec()),
                 Target::Xzx(b) => (Kind::Vector, at(b), vec![0.0; 3]),
                 Target::Weights { first } => {
@@ -66,7 +72,15 @@ impl<'a> Plan<'a> {
                 }
             };
             let samples = Samples::of(&track.curve, kind);
-            let job = Job { target: track.target.clone(), source: track.curve.clone(), samples, rest, lever, weight: 1.0, made: None };
+            let job = Job {
+                target: track.target.clone(),
+                source: track.curve.clone(),
+                samples,
+                rest,
+                lever,
+                weight: 1.0,
+                made: None,
+            };
             jobs.push(job);
         }
         let moments = times::coarse(clip, SEARCH_MOMENTS);
@@ -77,8 +91,8 @@ impl<'a> Plan<'a> {
     pub fn search(&mut self, gauge: &Gauge) -> Baked {
         let aim = 0.97 * self.desc.tolerance;
         let mut best = 0.0;
-        let (mut low, mut high) = (0.0, f64::INFINITY);
-        for _ in 0..9 {
+        let (mut low, mut high) = (1e-4, f64::INFINITY);
+        for _ in 0..14 {
             self.make_all();
             let error = gauge.worst(self.clip, &self.assemble(), &self.moments).distance;
             if error <= aim {
@@ -86,16 +100,18 @@ impl<'a> Plan<'a> {
             } else {
                 high = self.share;
             }
-            // Errors grow about as the share does.
-            let guess = if error > 0.0 { self.share * 0.98 * aim / error } else { 2.0 * self.share };
-            self.share = if high.is_finite() {
-                if guess > low && guess < high { guess } else { 0.5 * (low + high) }
-            } else {
-                guess.clamp(1.3 * low, 4.0 * low)
-            };
-            if high.is_finite() && high - low < 0.03 * high {
+            if high < 1.03 * low {
                 break;
             }
+            // Errors grow about as the share does.
+            let guess = self.share * 0.98 * aim / error.max(1e-30);
+            self.share = if high.is_infinite() {
+                guess.clamp(1.3 * low, 4.0 * low)
+            } else if guess > 1.01 * low && guess < 0.99 * high {
+                guess
+            } else {
+                (low * high).sqrt()
+            };
         }
         self.share = best;
         self.make_all();
@@ -174,7 +190,9 @@ impl<'a> Plan<'a> {
             clip.tracks.extend(curve.ok().map(|curve| Track { target: job.target.clone(), curve }));
             return self.hold_ends(clip);
         }
-        for (missing, time, first) in [(found.start > want.start, want.start, true), (found.end < want.end, want.end, false)] {
+        for (missing, time, first) in
+            [(found.start > want.start, want.start, true), (found.end < want.end, want.end, false)]
+        {
             let shortest = clip.tracks.iter_mut().min_by_key(|t| (t.curve.times().len(), t.curve.width()));
             let Some(track) = shortest.filter(|_| missing) else { continue };
             track.curve = with_end(&track.curve, time, first);
@@ -237,7 +255,14 @@ impl Job {
         if self.source.interpolation() == Interpolation::Hold {
             return Some((self.steps(allowed, stored), short));
         }
-        let pieces = fit::straight(s, allowed, stored);
+        let mut pieces = fit::fitted(s, allowed, &stored);
+        // Keys that stay where all of them were share their times with other tracks.
+        let value = s.width * if short { 2 } else { 4 };
+        if self.source.interpolation() == Interpolation::Linear
+            && pieces.keys.len() * (value + 4) > s.own.len() * value
+        {
+            pieces = fit::all(s, stored);
+        }
         let times = pieces.keys.iter().map(|&k| s.times[k]).collect();
         let curve = Curve::new(times, pieces.values, s.width, Interpolation::Linear);
         Some((curve.expect("keys of a curve, in order"), short))

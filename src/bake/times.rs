@@ -41,7 +41,9 @@ pub(super) fn verify(gauge: &Gauge, a: &Clip, b: &Clip) -> (Worst, f64, usize) {
     let times = dense(&knots(&[a, b]));
     let found = gauge.profile(a, b, &times);
     let mut moments = times.len();
-    let worst = |list: &[Worst]| list.iter().copied().fold(Worst::default(), |w, o| if o.distance > w.distance { o } else { w });
+    let worst = |list: &[Worst]| {
+        list.iter().copied().fold(Worst::default(), |w, o| if o.distance > w.distance { o } else { w })
+    };
     let mut top = worst(&found);
 
     // Halve the steps around the worst moments until nothing is gained.
@@ -49,10 +51,13 @@ pub(super) fn verify(gauge: &Gauge, a: &Clip, b: &Clip) -> (Worst, f64, usize) {
     order.sort_by(|&i, &j| found[j].distance.total_cmp(&found[i].distance).then(i.cmp(&j)));
     order.truncate(CLOSER);
     let around = |i: usize| [times[i.saturating_sub(1)], times[(i + 1).min(times.len() - 1)]];
-    let closer: Vec<f64> = order.iter().flat_map(|&i| {
-        let [from, to] = around(i);
-        (1..16).map(move |k| from + (to - from) * k as f64 / 16.0)
-    }).collect();
+    let closer: Vec<f64> = order
+        .iter()
+        .flat_map(|&i| {
+            let [from, to] = around(i);
+            (1..16).map(move |k| from + (to - from) * k as f64 / 16.0)
+        })
+        .collect();
     let more = gauge.profile(a, b, &closer);
     moments += more.len();
     let best = worst(&more);

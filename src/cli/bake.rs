@@ -66,7 +66,8 @@ fn tolerance(text: &str) -> Result<Tolerance, String> {
 pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     let import = load(&args.input, Options::default(), say)?;
     if import.format != "glTF" {
-        let message = format!("{}: baking reads glTF files; this is a {}", args.input.display(), import.format);
+        let message =
+            format!("{}: baking reads glTF files; this is a {}", args.input.display(), import.format);
         return Err(Failure::Usage(message));
     }
     let clips = import.asset.character.clips();
@@ -77,7 +78,8 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     if chosen.is_empty() {
         return Err(Failure::Input(format!("{}: there are no clips to bake", args.input.display())));
     }
-    let threads = args.threads.map_or_else(|| std::thread::available_parallelism().map_or(1, Into::into), Into::into);
+    let threads =
+        args.threads.map_or_else(|| std::thread::available_parallelism().map_or(1, Into::into), Into::into);
     let diagonal = Gauge::new(&import.asset.character, threads).diagonal();
     let metres = match args.tolerance {
         Tolerance::Metres(m) => m,
@@ -108,7 +110,10 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
 
 fn bone_of(import: &Import, b: &Baked) -> String {
     let (character, worst) = (&import.asset.character, b.report.worst);
-    let bone = character.instances().get(worst.instance).and_then(|_| character.bones_of(worst.instance, worst.vertex).next());
+    let bone = character
+        .instances()
+        .get(worst.instance)
+        .and_then(|_| character.bones_of(worst.instance, worst.vertex).next());
     bone.map_or_else(String::new, |b| character.skeleton().name(b).into())
 }
 
@@ -144,12 +149,21 @@ fn report(import: &Import, chosen: &[usize], baked: &[Baked], metres: f64, diago
     json!({"tolerance": metres, "diagonal": diagonal, "metric": "vertices", "clips": clips.collect::<Vec<_>>()})
 }
 
-fn write(args: &Args, import: &Import, chosen: &[usize], baked: &[Baked], report: &Value) -> Result<(), Failure> {
+fn write(
+    args: &Args,
+    import: &Import,
+    chosen: &[usize],
+    baked: &[Baked],
+    report: &Value,
+) -> Result<(), Failure> {
     let bad = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", args.input.display()));
     let bytes = io::read_file(&args.input).map_err(|e| bad(&e))?;
     let folder = args.input.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let clips: Vec<gltf::NewClip> =
-        baked.iter().zip(chosen).map(|(b, &c)| gltf::NewClip { clip: &b.clip, short: &b.short, replaces: Some(c) }).collect();
+    let clips: Vec<gltf::NewClip> = baked
+        .iter()
+        .zip(chosen)
+        .map(|(b, &c)| gltf::NewClip { clip: &b.clip, short: &b.short, replaces: Some(c) })
+        .collect();
     let extras = Map::from_iter([("sinew".to_owned(), report.clone())]);
     let name = args.input.display().to_string();
     let out = gltf::with_clips(&bytes, Some(folder), &name, import, &clips, extras).map_err(|e| bad(&e))?;

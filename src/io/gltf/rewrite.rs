@@ -59,14 +59,15 @@ pub fn with_clips(
     let parts = container::split(bytes, name)?;
     let mut w = Warnings::default();
     let doc = Document::new(mend::root(parts.json, &mut w)?, parts.bin, base_dir, &mut w)?;
-    let mut json: Map<String, Value> = serde_json::from_slice(parts.json)
-        .map_err(|e| value("the JSON", "an object", e.to_string()))?;
+    let mut json: Map<String, Value> =
+        serde_json::from_slice(parts.json).map_err(|e| value("the JSON", "an object", e.to_string()))?;
     let old = json.remove("animations").unwrap_or_default();
     drop_accessors(&mut json, &old);
     let mut out = Rewritten { bin: repack(&mut json, &doc), json };
     out.animate(import, clips, &old)?;
     out.json.entry("asset").or_insert(json!({"version": "2.0"}));
-    let asset = out.json["asset"].as_object_mut().ok_or_else(|| value("asset", "an object", "something else"))?;
+    let asset =
+        out.json["asset"].as_object_mut().ok_or_else(|| value("asset", "an object", "something else"))?;
     asset.insert("generator".into(), concat!("sinew ", env!("CARGO_PKG_VERSION")).into());
     if let Some(map) = asset.entry("extras").or_insert(json!({})).as_object_mut() {
         map.extend(extras);
@@ -163,7 +164,9 @@ impl Rewritten {
         if list(&mut self.json, "buffers").is_empty() {
             list(&mut self.json, "buffers").push(json!({}));
         }
-        for sampler in list(&mut self.json, "animations").iter_mut().flat_map(|a| a["samplers"].as_array_mut()).flatten() {
+        for sampler in
+            list(&mut self.json, "animations").iter_mut().flat_map(|a| a["samplers"].as_array_mut()).flatten()
+        {
             for end in ["input", "output"] {
                 let k = sampler[end].as_u64().unwrap_or(0) as usize;
                 sampler[end] = (accessors + k).into();
@@ -193,7 +196,8 @@ fn targets(import: &Import, target: &Target) -> Result<Vec<(u32, &'static str)>>
         }
         Target::Weights { first } => {
             let of = import.asset.character.instances().iter().zip(&import.primitives);
-            let mut nodes: Vec<u32> = of.filter(|(i, _)| i.first_weight == *first).map(|(_, p)| p.node).collect();
+            let mut nodes: Vec<u32> =
+                of.filter(|(i, _)| i.first_weight == *first).map(|(_, p)| p.node).collect();
             nodes.dedup();
             return Ok(nodes.into_iter().map(|n| (n, "weights")).collect());
         }
@@ -218,7 +222,9 @@ impl Keys {
             Interpolation::Hold => "STEP",
             Interpolation::Linear => "LINEAR",
             Interpolation::Hermite => "CUBICSPLINE",
-            Interpolation::CatmullRom(_) => return Err(value("a clip", "holds, lines or cubics with slopes", "Catmull-Rom")),
+            Interpolation::CatmullRom(_) => {
+                return Err(value("a clip", "holds, lines or cubics with slopes", "Catmull-Rom"));
+            }
         };
         let kind = match track.target {
             Target::Weights { .. } => "SCALAR",
@@ -244,7 +250,8 @@ impl Keys {
         let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
         let mut accessor = json!({"componentType": 5126, "count": values.len() / width, "type": kind});
         if kind == "SCALAR" {
-            let (lo, hi) = values.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+            let (lo, hi) =
+                values.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
             // A key's time has bounds by the specification; weights may.
             (accessor["min"], accessor["max"]) = (json!([lo]), json!([hi]));
         }
@@ -252,8 +259,10 @@ impl Keys {
     }
 
     fn shorts(&mut self, values: &[f32]) -> usize {
-        let bytes: Vec<u8> = values.iter().flat_map(|v| ((v * 32767.0).round() as i16).to_le_bytes()).collect();
-        let accessor = json!({"componentType": 5122, "normalized": true, "count": values.len() / 4, "type": "VEC4"});
+        let bytes: Vec<u8> =
+            values.iter().flat_map(|v| ((v * 32767.0).round() as i16).to_le_bytes()).collect();
+        let accessor =
+            json!({"componentType": 5122, "normalized": true, "count": values.len() / 4, "type": "VEC4"});
         self.put(bytes, "short", accessor, 1)
     }
 
@@ -291,7 +300,8 @@ fn primitives(json: &mut Map<String, Value>) -> impl Iterator<Item = &mut Value>
 
 /// Call `visit` on every index of an accessor outside of animations.
 fn accessor_places(json: &mut Map<String, Value>, visit: &mut impl FnMut(&mut Value)) {
-    let mut each = |v: &mut Value| v.as_object_mut().into_iter().flat_map(|o| o.values_mut()).for_each(&mut *visit);
+    let mut each =
+        |v: &mut Value| v.as_object_mut().into_iter().flat_map(|o| o.values_mut()).for_each(&mut *visit);
     for p in primitives(json) {
         p.get_mut("attributes").into_iter().for_each(&mut each);
         p.get_mut("targets").and_then(Value::as_array_mut).into_iter().flatten().for_each(&mut each);
@@ -312,7 +322,9 @@ fn drop_accessors(json: &mut Map<String, Value>, animations: &Value) {
     let count = list(json, "accessors").len();
     let mut gone = vec![false; count];
     if places_known {
-        for s in animations.as_array().into_iter().flatten().filter_map(|a| a["samplers"].as_array()).flatten() {
+        for s in
+            animations.as_array().into_iter().flatten().filter_map(|a| a["samplers"].as_array()).flatten()
+        {
             for end in ["input", "output"] {
                 if let Some(g) = s[end].as_u64().and_then(|i| gone.get_mut(i as usize)) {
                     *g = true;
@@ -362,7 +374,13 @@ fn take(items: &mut Vec<Value>, gone: &[bool]) -> Vec<Value> {
 
 fn renumbered(gone: &[bool]) -> Vec<u64> {
     let mut next = 0;
-    gone.iter().map(|g| { let k = next; next += !g as u64; k }).collect()
+    gone.iter()
+        .map(|g| {
+            let k = next;
+            next += !g as u64;
+            k
+        })
+        .collect()
 }
 
 fn renumber(v: &mut Value, new: &[u64]) {
@@ -442,7 +460,9 @@ fn repack(json: &mut Map<String, Value>, doc: &Document) -> Vec<u8> {
         let packed = packing(view).is_some();
         let r = source(view);
         let from = number(r, "byteOffset");
-        let place = moved.get(&number(r, "buffer")).and_then(|m| m.iter().find(|(r, _)| r[0] <= from && from <= r[1]));
+        let place = moved
+            .get(&number(r, "buffer"))
+            .and_then(|m| m.iter().find(|(r, _)| r[0] <= from && from <= r[1]));
         if let Some((range, to)) = place {
             (r["buffer"], r["byteOffset"]) = (0.into(), (to + from - range[0]).into());
         }
@@ -455,8 +475,14 @@ fn repack(json: &mut Map<String, Value>, doc: &Document) -> Vec<u8> {
     }
     let mut buffers = vec![json!({"byteLength": bin.len()})];
     if fallback > 0 {
-        buffers.push(json!({"byteLength": fallback, "extensions": {"EXT_meshopt_compression": {"fallback": true}}}));
+        buffers.push(
+            json!({"byteLength": fallback, "extensions": {"EXT_meshopt_compression": {"fallback": true}}}),
+        );
     }
-    if bin.is_empty() { json.remove("buffers") } else { json.insert("buffers".into(), buffers.into()) };
+    if bin.is_empty() {
+        json.remove("buffers")
+    } else {
+        json.insert("buffers".into(), buffers.into())
+    };
     bin
 }
