@@ -166,7 +166,13 @@ fn write(
         .collect();
     let extras = Map::from_iter([("sinew".to_owned(), report.clone())]);
     let name = args.input.display().to_string();
-    let out = gltf::with_clips(&bytes, Some(folder), &name, import, &clips, extras).map_err(|e| bad(&e))?;
+    let mut out =
+        gltf::with_clips(&bytes, Some(folder), &name, import, &clips, extras).map_err(|e| bad(&e))?;
+    // What lies beside the input is not beside an output in another folder.
+    let there = args.output.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if folder.canonicalize().ok() != there.canonicalize().ok() {
+        out.embed_pictures(Some(folder)).map_err(|e| bad(&e))?;
+    }
     let put = |path: &Path, bytes: &[u8]| {
         AtomicFile::write(path, bytes, args.force, Folder::MustExist).map_err(|e| Failure::Run(e.to_string()))
     };

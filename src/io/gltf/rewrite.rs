@@ -4,6 +4,7 @@ use super::container;
 use super::document::Document;
 use super::error::{Result, value};
 use super::mend;
+use super::uri::Source;
 use super::warnings::Warnings;
 use crate::clip::{Clip, Interpolation, Target, Track};
 use crate::io::Import;
@@ -76,6 +77,36 @@ pub fn with_clips(
 }
 
 impl Rewritten {
+    /// Take pictures that lie beside the file into the binary chunk, for a result that goes elsewhere.
+    ///
+    /// # Errors
+    /// [`GltfError`](super::GltfError) if one cannot be read.
+    pub fn embed_pictures(&mut self, base_dir: Option<&Path>) -> Result<()> {
+        for i in 0..self.json.get("images").and_then(Value::as_array).map_or(0, Vec::len) {
+            let place = format!("images[{i}].uri");
+            let Some(uri) = self.json["images"][i]["uri"].as_str().map(str::to_owned) else { continue };
+            let source = Source::of(&uri, base_dir, &place)?;
+            if matches!(source, Source::Data(_)) {
+                continue;
+            }
+            let bytes = source.read(&place)?;
+            let view = list(&mut self.json, "bufferViews").len();
+            self.bin.resize(self.bin.len().next_multiple_of(8), 0);
+            let range = json!({"buffer": 0, "byteOffset": self.bin.len(), "byteLength": bytes.len()});
+            list(&mut self.json, "bufferViews").push(range);
+            self.bin.extend(&bytes);
+            if list(&mut self.json, "buffers").is_empty() {
+                list(&mut self.json, "buffers").push(json!({}));
+            }
+            if let Some(image) = self.json["images"][i].as_object_mut() {
+                image.remove("uri");
+                image.insert("bufferView".into(), view.into());
+                image.insert("mimeType".into(), mime(&bytes).into());
+            }
+        }
+        Ok(())
+    }
+
     /// As one GLB.
     pub fn glb(&self) -> Vec<u8> {
         let mut json = self.with_buffer(None);
@@ -173,6 +204,13 @@ impl Rewritten {
             }
         }
     }
+}
+
+/// What kind of picture bytes are.
+fn mime(bytes: &[u8]) -> &'static str {
+    let heads: [(&[u8], &str); 3] =
+        [(b"\xff\xd8", "image/jpeg"), (b"RIFF", "image/webp"), (b"\xabKTX", "image/ktx2")];
+    heads.into_iter().find(|h| bytes.starts_with(h.0)).map_or("image/png", |h| h.1)
 }
 
 /// A list of the file; made if there is none.
