@@ -1,6 +1,7 @@
 //! What the library promises, a module a subject.
 
 mod architecture;
+#[cfg(feature = "io")]
 mod bake;
 #[cfg(feature = "cli")]
 mod batch;
