@@ -4,6 +4,7 @@
 //! distance to the farthest vertex that it moves. The shares are then grown together, and one by one, as long as the worst vertex
 //! stays within what was asked for. What is promised was measured on the vertices, at keys, at frames and between them.
 
+pub mod edit;
 mod fit;
 mod gauge;
 mod plan;
