@@ -2,10 +2,11 @@
 
 use super::{Failure, load, print, say::Say};
 use serde_json::{Map, Value, json};
-use sinew::bake::{self, BakeDesc, BakeError, Baked, Gauge};
+use sinew::bake::{self, BakeDesc, BakeError, Baked, Gauge, edit};
 use sinew::clip::Clip;
 use sinew::io::picture::{AtomicFile, Folder};
 use sinew::io::{self, Import, Options, gltf};
+use sinew::time::Range;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -13,6 +14,8 @@ Examples:
   sinew bake fox.glb -o small.glb                       0.01% of the character's diagonal
   sinew bake fox.glb -o small.glb --tolerance 0.5mm
   sinew bake fox.glb -o run.gltf --clip Run --json
+  sinew bake fox.glb -o back.glb --clip Walk --trim 0.2..0.6 --reverse --speed 1.5
+  sinew bake fox.glb -o all.glb --concat Everything
 
 No vertex of the skin moves by more than the tolerance, at any time: at keys, at frames and between them. What was reached is printed
 and written into asset.extras.sinew. Everything but the animations is carried through untouched. Where the bound cannot be kept, nothing is
@@ -32,6 +35,18 @@ pub struct Args {
     /// Only this clip, by name or index; all of them by default.
     #[arg(long, value_name = "NAME|INDEX")]
     clip: Option<String>,
+    /// Only this part of each clip, in seconds; either end may be left out.
+    #[arg(long, value_name = "FROM..TO", value_parser = part)]
+    trim: Option<[Option<f64>; 2]>,
+    /// Turn the clips round.
+    #[arg(long)]
+    reverse: bool,
+    /// Play faster: 2 lasts half as long.
+    #[arg(long, value_name = "FACTOR", value_parser = factor)]
+    speed: Option<f64>,
+    /// Join the clips into one of this name.
+    #[arg(long, value_name = "NAME", conflicts_with = "clip")]
+    concat: Option<String>,
     /// Keep rotations as 32-bit floating point.
     #[arg(long)]
     no_quantize: bool,
@@ -63,6 +78,59 @@ fn tolerance(text: &str) -> Result<Tolerance, String> {
     }
 }
 
+/// `0.5..2`, `..2` or `0.5..`.
+fn part(text: &str) -> Result<[Option<f64>; 2], String> {
+    let wrong = || "expected two times in seconds, as in 0.5..2, ..2 or 0.5..".to_owned();
+    let (from, to) = text.split_once("..").ok_or_else(wrong)?;
+    let end = |t: &str| match t.trim() {
+        "" => Ok(None),
+        t => t.parse::<f64>().ok().filter(|t| t.is_finite()).map(Some).ok_or_else(wrong),
+    };
+    match [end(from)?, end(to)?] {
+        [Some(a), Some(b)] if a >= b => Err(format!("{a} is not before {b}")),
+        ends => Ok(ends),
+    }
+}
+
+fn factor(text: &str) -> Result<f64, String> {
+    text.parse::<f64>()
+        .ok()
+        .filter(|f| *f > 0.0 && f.is_finite())
+        .ok_or_else(|| "expected a number above 0, as in 2 or 0.5".into())
+}
+
+/// The clips as they are to be baked, and which of the file's each takes the place of.
+fn edited(args: &Args, import: &Import, chosen: &[usize]) -> Result<Vec<(Clip, Option<usize>)>, Failure> {
+    let clips = import.asset.character.clips();
+    let mut out = vec![];
+    for &c in chosen {
+        let mut clip = clips[c].clone();
+        if let Some([from, to]) = args.trim {
+            let whole = clip.playback();
+            let range = Range { start: from.unwrap_or(whole.start), end: to.unwrap_or(whole.end) };
+            if range.start >= whole.end || range.end <= whole.start || range.start >= range.end {
+                let (name, Range { start, end }) = (super::say::name(&clip.name), whole);
+                let message =
+                    format!("--trim: clip {name} runs from {start} to {end} s; nothing would be left of it");
+                return Err(Failure::Usage(message));
+            }
+            clip = edit::trim(&clip, range);
+        }
+        if args.reverse {
+            clip = edit::reverse(&clip);
+        }
+        if let Some(factor) = args.speed {
+            clip = edit::speed(&clip, factor);
+        }
+        out.push((clip, Some(c)));
+    }
+    if let Some(name) = &args.concat {
+        let all: Vec<&Clip> = out.iter().map(|c| &c.0).collect();
+        out = vec![(edit::concat(name, &all), None)];
+    }
+    Ok(out)
+}
+
 pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     let import = load(&args.input, Options::default(), say)?;
     if import.format != "glTF" {
@@ -86,26 +154,35 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
         Tolerance::OfDiagonal(part) => part * diagonal,
     };
     let desc = BakeDesc { tolerance: metres, quantize: !args.no_quantize, threads };
-    let bar = say.progress(chosen.len());
-    let mut baked = vec![];
-    for &c in &chosen {
-        baked.push(bake::bake(&import.asset.character, &clips[c], &desc).map_err(|e| match e {
+    let clips = edited(args, &import, &chosen)?;
+    let bar = say.progress(clips.len());
+    let mut done = vec![];
+    for (clip, replaces) in &clips {
+        let baked = bake::bake(&import.asset.character, clip, &desc).map_err(|e| match e {
             BakeError::Missed { .. } => Failure::Differs(format!("{}: {e}", args.input.display())),
             BakeError::Tolerance { .. } => Failure::Usage(format!("{}: {e}", args.input.display())),
-        })?);
+        })?;
+        done.push(Done { clip, replaces: *replaces, baked });
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let report = report(&import, &chosen, &baked, metres, diagonal);
-    write(args, &import, &chosen, &baked, &report)?;
+    let report = report(&import, &done, metres, diagonal);
+    write(args, &import, &done, &report)?;
     if args.json {
-        return print(format!("{:#}\n", report).as_bytes());
+        return print(format!("{report:#}\n").as_bytes());
     }
-    for (&c, b) in chosen.iter().zip(&baked) {
-        say.note(&line(&import, &clips[c], b, diagonal));
+    for d in &done {
+        say.note(&line(&import, d, diagonal));
     }
     say.note(&format!("wrote {}", args.output.display()));
     Ok(())
+}
+
+/// A clip, and what was made of it.
+struct Done<'a> {
+    clip: &'a Clip,
+    replaces: Option<usize>,
+    baked: Baked,
 }
 
 fn bone_of(import: &Import, b: &Baked) -> String {
@@ -117,8 +194,8 @@ fn bone_of(import: &Import, b: &Baked) -> String {
     bone.map_or_else(String::new, |b| character.skeleton().name(b).into())
 }
 
-fn line(import: &Import, clip: &Clip, b: &Baked, diagonal: f64) -> String {
-    let r = &b.report;
+fn line(import: &Import, done: &Done, diagonal: f64) -> String {
+    let (clip, r) = (done.clip, &done.baked.report);
     format!(
         "{}: {} → {} keys, {} → {} bytes; at most {:.4} mm off ({:.4}% of the diagonal), at {:.3} s on {}",
         super::say::name(&clip.name),
@@ -129,15 +206,15 @@ fn line(import: &Import, clip: &Clip, b: &Baked, diagonal: f64) -> String {
         1e3 * r.ceiling,
         100.0 * r.ceiling / diagonal.max(1e-30),
         r.worst.time,
-        super::say::name(&bone_of(import, b)),
+        super::say::name(&bone_of(import, &done.baked)),
     )
 }
 
-fn report(import: &Import, chosen: &[usize], baked: &[Baked], metres: f64, diagonal: f64) -> Value {
-    let clips = chosen.iter().zip(baked).map(|(&c, b)| {
-        let r = &b.report;
+fn report(import: &Import, done: &[Done], metres: f64, diagonal: f64) -> Value {
+    let clips = done.iter().map(|d| {
+        let (b, r) = (&d.baked, &d.baked.report);
         json!({
-            "clip": import.asset.character.clips()[c].name,
+            "clip": d.clip.name,
             "error": r.ceiling,
             "measured": r.worst.distance,
             "worst": {"time": r.worst.time, "instance": r.worst.instance, "vertex": r.worst.vertex, "bone": bone_of(import, b)},
@@ -149,20 +226,13 @@ fn report(import: &Import, chosen: &[usize], baked: &[Baked], metres: f64, diago
     json!({"tolerance": metres, "diagonal": diagonal, "metric": "vertices", "clips": clips.collect::<Vec<_>>()})
 }
 
-fn write(
-    args: &Args,
-    import: &Import,
-    chosen: &[usize],
-    baked: &[Baked],
-    report: &Value,
-) -> Result<(), Failure> {
+fn write(args: &Args, import: &Import, done: &[Done], report: &Value) -> Result<(), Failure> {
     let bad = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", args.input.display()));
     let bytes = io::read_file(&args.input).map_err(|e| bad(&e))?;
     let folder = args.input.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let clips: Vec<gltf::NewClip> = baked
+    let clips: Vec<gltf::NewClip> = done
         .iter()
-        .zip(chosen)
-        .map(|(b, &c)| gltf::NewClip { clip: &b.clip, short: &b.short, replaces: Some(c) })
+        .map(|d| gltf::NewClip { clip: &d.baked.clip, short: &d.baked.short, replaces: d.replaces })
         .collect();
     let extras = Map::from_iter([("sinew".to_owned(), report.clone())]);
     let name = args.input.display().to_string();
