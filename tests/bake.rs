@@ -1,7 +1,7 @@
 //! Baking: bounds that hold, steps that stay steps, files that stay whole.
 
 use glam::{Quat, Vec3};
-use sinew::bake::{BakeDesc, BakeError, Gauge, bake};
+use sinew::bake::{BakeDesc, BakeError, Gauge, Metric, bake};
 use sinew::character::{Binding, Character, Instance, MeshId};
 use sinew::clip::{Clip, Curve, Interpolation, Target, Track};
 use sinew::fk;
@@ -39,7 +39,7 @@ fn swing(bones: &[BoneId]) -> Clip {
 }
 
 fn desc(tolerance: f64) -> BakeDesc {
-    BakeDesc { tolerance, quantize: true, threads: 1 }
+    BakeDesc { tolerance, ..BakeDesc::default() }
 }
 
 /// The worst vertex by the f64 reference, which shares nothing with the gauge but the meaning of a clip.
@@ -67,7 +67,7 @@ fn no_vertex_leaves_its_tolerance_at_keys_frames_or_between() {
         let baked = bake(&character, &clip, &desc(tolerance)).unwrap();
         let error = measured(&character, &clip, &baked.clip, (0..=20_000).map(|k| k as f64 * 1e-4));
         assert!(
-            error <= baked.report.ceiling && baked.report.ceiling <= tolerance,
+            error <= baked.report.ceiling * tolerance && baked.report.ceiling <= 1.0,
             "{error} {:?}",
             baked.report
         );
@@ -78,6 +78,35 @@ fn no_vertex_leaves_its_tolerance_at_keys_frames_or_between() {
         assert_eq!(baked.clip.range(), clip.range());
     }
     assert!(keys < 80, "{keys}");
+}
+
+#[test]
+fn pinned_bones_and_shells_have_bounds_of_their_own() {
+    let (character, bones) = arm();
+    let clip = swing(&bones);
+    let origin = |clip: &Clip, b: BoneId, t: f64| {
+        let mut pose = character.rest_pose();
+        clip.sample(character.skeleton(), t, &mut pose);
+        fk::forward_f64(character.skeleton(), &pose)[b.index()].translation
+    };
+    let off = |a: &Clip, b: BoneId| {
+        let times = (0..=2000).map(|k| k as f64 * 1e-3);
+        times.map(|t| origin(&clip, b, t).distance(origin(a, b, t))).fold(0.0, f64::max)
+    };
+    let loose = bake(&character, &clip, &desc(1e-2)).unwrap();
+    assert!(off(&loose.clip, bones[2]) > 1e-4);
+    let pinned = bake(&character, &clip, &BakeDesc { pins: vec![(bones[2], 1e-4)], ..desc(1e-2) }).unwrap();
+    assert!(off(&pinned.clip, bones[2]) <= 1e-4 && pinned.report.keys[1] > loose.report.keys[1]);
+
+    // A larger shell is harder to keep; neither asks for a skin.
+    let bare = Character::new(character.skeleton().clone(), vec![], vec![], vec![], vec![]).unwrap();
+    let keys = |radius: f64| {
+        let desc = BakeDesc { metric: Metric::Shell(radius), ..desc(1e-3) };
+        let baked = bake(&bare, &clip, &desc).unwrap();
+        assert!(bones.iter().all(|b| off(&baked.clip, *b) <= 1e-3));
+        baked.report.keys[1]
+    };
+    assert!(keys(1.0) > keys(0.01));
 }
 
 #[test]

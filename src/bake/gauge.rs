@@ -1,28 +1,60 @@
 //! How far two clips move a character's vertices apart: the measure that every bound is stated in.
 
+use super::BakeDesc;
 use crate::character::{Character, Scratch};
 use crate::clip::Clip;
 use crate::fk::{self, Posed};
 use crate::pose::Pose;
+use crate::skeleton::BoneId;
 use glam::{DVec3, Vec3};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// The largest distance that was found, and where.
+/// Which points of a character must not stray.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub enum Metric {
+    /// Every vertex of the skin, skinned and morphed.
+    #[default]
+    Vertices,
+    /// Points at this distance around every bone's origin, metres: for skeletons without a skin, and for whatever may hang there.
+    Shell(f64),
+}
+
+/// Where something strayed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Spot {
+    /// A vertex of a mesh instance.
+    Vertex {
+        /// Mesh instance.
+        instance: usize,
+        /// Vertex of its mesh.
+        vertex: usize,
+    },
+    /// A point on or around a bone.
+    Bone(BoneId),
+}
+
+/// The point that strayed farthest, measured by what it may.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Worst {
-    /// Metres between a vertex of one clip and the same vertex of the other, world space.
+    /// Metres between the point of one clip and the same point of the other, world space.
     pub distance: f64,
+    /// Metres that it may stray.
+    pub limit: f64,
     /// Seconds.
     pub time: f64,
-    /// Mesh instance.
-    pub instance: usize,
-    /// Vertex of its mesh.
-    pub vertex: usize,
+    /// Which point; none where nothing strayed.
+    pub spot: Option<Spot>,
 }
 
 impl Worst {
-    fn worse(self, other: Self) -> Self {
-        if other.distance > self.distance { other } else { self }
+    /// Distance as a part of the limit.
+    pub fn share(&self) -> f64 {
+        if self.distance > 0.0 { self.distance / self.limit } else { 0.0 }
+    }
+
+    /// The one of larger share; the first of equals.
+    pub fn worse(self, other: Self) -> Self {
+        if other.share() > self.share() { other } else { self }
     }
 }
 
@@ -48,12 +80,21 @@ struct Bench {
 pub struct Gauge<'a> {
     character: &'a Character,
     threads: usize,
+    limit: f64,
+    metric: Metric,
+    pins: &'a [(BoneId, f64)],
 }
 
 impl<'a> Gauge<'a> {
-    /// For a character; the results do not depend on `threads`.
+    /// For the vertices of a character, with a limit of a metre; the results do not depend on `threads`.
     pub fn new(character: &'a Character, threads: usize) -> Self {
-        Self { character, threads: threads.max(1) }
+        Self { character, threads: threads.max(1), limit: 1.0, metric: Metric::Vertices, pins: &[] }
+    }
+
+    /// For what a bake promises.
+    pub fn of(character: &'a Character, desc: &'a BakeDesc) -> Self {
+        let BakeDesc { tolerance, metric, ref pins, .. } = *desc;
+        Self { limit: tolerance, metric, pins, ..Self::new(character, desc.threads) }
     }
 
     /// The diagonal of the box around all vertices at rest, metres.
@@ -71,12 +112,12 @@ impl<'a> Gauge<'a> {
         if bounds[0].x > bounds[1].x { 0.0 } else { (bounds[1] - bounds[0]).as_dvec3().length() }
     }
 
-    /// The worst vertex at any of these times, in seconds. Times outside a clip hold its ends.
+    /// The worst point at any of these times, in seconds. Times outside a clip hold its ends.
     pub fn worst(&self, a: &Clip, b: &Clip, times: &[f64]) -> Worst {
         self.each(times, |bench, t| self.at(a, b, t, bench)).into_iter().fold(Worst::default(), Worst::worse)
     }
 
-    /// The worst distance at each time, metres.
+    /// The worst point at each time.
     pub fn profile(&self, a: &Clip, b: &Clip, times: &[f64]) -> Vec<Worst> {
         self.each(times, |bench, t| self.at(a, b, t, bench))
     }
@@ -129,13 +170,38 @@ impl<'a> Gauge<'a> {
         let center = c.center(&bench.posed);
         let first = std::mem::take(&mut bench.posed);
         fk::forward(c.skeleton(), &poses[1], &mut bench.posed);
-        for instance in 0..c.instances().len() {
-            let [p, q] = &mut bench.positions;
-            c.positions(instance, &poses[0], &first, center, &mut bench.scratch, p);
-            c.positions(instance, &poses[1], &bench.posed, center, &mut bench.scratch, q);
-            let (vertex, d2) = farthest(p, q);
-            let distance = (d2 as f64).sqrt();
-            worst = worst.worse(Worst { distance, time, instance, vertex });
+        let limit = self.limit;
+        match self.metric {
+            Metric::Vertices => {
+                for instance in 0..c.instances().len() {
+                    let [p, q] = &mut bench.positions;
+                    c.positions(instance, &poses[0], &first, center, &mut bench.scratch, p);
+                    c.positions(instance, &poses[1], &bench.posed, center, &mut bench.scratch, q);
+                    let (vertex, d2) = farthest(p, q);
+                    let spot = Some(Spot::Vertex { instance, vertex });
+                    worst = worst.worse(Worst { distance: (d2 as f64).sqrt(), limit, time, spot });
+                }
+            }
+            Metric::Shell(radius) => {
+                for bone in c.skeleton().ids() {
+                    let [a, b] = [&first, &bench.posed].map(|p| p.near(bone, center));
+                    // No point of the shell turns farther than its radius times the norm of the difference.
+                    let m = a.matrix3 - b.matrix3;
+                    let turn =
+                        (m.x_axis.length_squared() + m.y_axis.length_squared() + m.z_axis.length_squared())
+                            .sqrt();
+                    let distance = a.translation.distance(b.translation) as f64 + radius * turn as f64;
+                    worst = worst.worse(Worst { distance, limit, time, spot: Some(Spot::Bone(bone)) });
+                }
+            }
+        }
+        for &(bone, limit) in self.pins {
+            let tip = c.skeleton().tip(bone);
+            let [a, b] = [&first, &bench.posed].map(|p| p.near(bone, center));
+            for point in [Vec3::ZERO, tip] {
+                let distance = a.transform_point3(point).distance(b.transform_point3(point)) as f64;
+                worst = worst.worse(Worst { distance, limit, time, spot: Some(Spot::Bone(bone)) });
+            }
         }
         worst
     }
@@ -157,8 +223,20 @@ impl<'a> Gauge<'a> {
         let pose = self.pose(clip, t);
         fk::forward(skeleton, &pose, &mut bench.posed);
         let center = c.center(&bench.posed);
-        // The box around all that a bone moves holds those of its children.
         let mut boxes = vec![[Vec3::INFINITY, Vec3::NEG_INFINITY]; skeleton.len()];
+        if let Metric::Shell(radius) = self.metric {
+            for bone in skeleton.ids() {
+                let origin: Vec3 = bench.posed.near(bone, center).translation.into();
+                boxes[bone.index()] =
+                    [Vec3::splat(-radius as f32), Vec3::splat(radius as f32)].map(|r| r + origin);
+            }
+        }
+        for &(bone, _) in self.pins {
+            let origin: Vec3 = bench.posed.near(bone, center).translation.into();
+            let b = &mut boxes[bone.index()];
+            *b = [b[0].min(origin), b[1].max(origin)];
+        }
+        // The box around all that a bone moves holds those of its children.
         for instance in 0..c.instances().len() {
             let p = &mut bench.positions[0];
             c.positions(instance, &pose, &bench.posed, center, &mut bench.scratch, p);
@@ -176,7 +254,7 @@ impl<'a> Gauge<'a> {
                 *b = [b[0].min(lo), b[1].max(hi)];
             }
         }
-        let reach = |bone: crate::skeleton::BoneId| {
+        let reach = |bone: BoneId| {
             let [lo, hi] = boxes[bone.index()];
             if lo.x > hi.x {
                 return Lever::default();

@@ -10,29 +10,47 @@ mod gauge;
 mod plan;
 mod times;
 
-pub use gauge::{Gauge, Lever, Worst};
+pub use gauge::{Gauge, Lever, Metric, Spot, Worst};
 
 use crate::character::Character;
 use crate::clip::Clip;
+use crate::skeleton::BoneId;
 use plan::Plan;
 
 /// How a clip is to be baked.
-#[derive(Clone, Copy, Debug, PartialEq)]
+///
+/// ```
+/// use sinew::bake::BakeDesc;
+/// let half_a_millimetre = BakeDesc { tolerance: 5e-4, ..BakeDesc::default() };
+/// assert!(half_a_millimetre.quantize);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
 pub struct BakeDesc {
-    /// Metres that any vertex may be off at any time.
+    /// Metres that any point may be off at any time.
     pub tolerance: f64,
+    /// Which points.
+    pub metric: Metric,
+    /// Bones whose origin and tip may be off by so many metres only.
+    pub pins: Vec<(BoneId, f64)>,
     /// Rotations may be stored as normalised 16-bit integers, where the bound allows.
     pub quantize: bool,
     /// Worker threads; the result does not depend on them.
     pub threads: usize,
 }
 
+impl Default for BakeDesc {
+    /// A millimetre, on the skin.
+    fn default() -> Self {
+        Self { tolerance: 1e-3, metric: Metric::Vertices, pins: vec![], quantize: true, threads: 1 }
+    }
+}
+
 /// What was reached.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Report {
-    /// The worst vertex that was found.
+    /// The worst point that was found.
     pub worst: Worst,
-    /// No vertex is farther off than that, metres: the worst found, and what may hide between the moments looked at.
+    /// No point is farther off than that share of what it may: the worst found, and what may hide between the moments looked at.
     pub ceiling: f64,
     /// Moments at which all vertices were compared.
     pub moments: usize,
@@ -62,6 +80,11 @@ pub enum BakeError {
         /// What was asked for.
         found: f64,
     },
+    /// Vertices are to keep a bound, and there are none.
+    #[error(
+        "there is no skin that could keep a bound; measure a shell around the bones instead (`--metric shell:3cm`)"
+    )]
+    NoSkin,
     /// The bound cannot be kept.
     #[error(
         "clip `{clip}`: asked for {tolerance:.3e} m, reached {reached:.3e} m at {time:.4} s; single precision holds no less here: \
@@ -87,10 +110,15 @@ pub enum BakeError {
 /// # Panics
 /// If the clip is not of the character.
 pub fn bake(character: &Character, clip: &Clip, desc: &BakeDesc) -> Result<Baked, BakeError> {
-    if desc.tolerance.is_nan() || desc.tolerance <= 0.0 {
-        return Err(BakeError::Tolerance { found: desc.tolerance });
+    let mut asked = std::iter::once(desc.tolerance).chain(desc.pins.iter().map(|p| p.1));
+    if let Some(found) = asked.find(|t| t.is_nan() || *t <= 0.0) {
+        return Err(BakeError::Tolerance { found });
     }
-    let gauge = Gauge::new(character, desc.threads);
+    let vertices = character.instances().iter().map(|i| character.mesh(i).positions.len()).sum::<usize>();
+    if vertices == 0 && desc.metric == Metric::Vertices {
+        return Err(BakeError::NoSkin);
+    }
+    let gauge = Gauge::of(character, desc);
     let mut plan = Plan::new(character, clip, &gauge, desc);
     let mut baked = plan.search(&gauge);
     let mut share = 1.0;
@@ -98,18 +126,19 @@ pub fn bake(character: &Character, clip: &Clip, desc: &BakeDesc) -> Result<Baked
         let (worst, ceiling, moments) = times::verify(&gauge, clip, &baked.clip);
         let report = &mut baked.report;
         (report.worst, report.ceiling, report.moments) = (worst, ceiling, moments);
-        if ceiling <= desc.tolerance {
+        if ceiling <= 1.0 {
             return Ok(baked);
         }
         // What hid between the moments of the search: aim a little lower.
-        share *= (0.95 * desc.tolerance / ceiling).min(0.9);
+        share *= (0.95 / ceiling).min(0.9);
         baked = plan.within(share);
     }
     let plain = plan.untouched();
     let (worst, ceiling, moments) = times::verify(&gauge, clip, &plain.clip);
-    if ceiling <= desc.tolerance {
+    if ceiling <= 1.0 {
         return Ok(Baked { report: Report { worst, ceiling, moments, ..plain.report }, ..plain });
     }
     let clip = clip.name.clone();
-    Err(BakeError::Missed { clip, tolerance: desc.tolerance, reached: ceiling, time: worst.time })
+    let (tolerance, reached) = (worst.limit, ceiling * worst.limit);
+    Err(BakeError::Missed { clip, tolerance, reached, time: worst.time })
 }

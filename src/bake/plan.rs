@@ -84,17 +84,17 @@ impl<'a> Plan<'a> {
             jobs.push(job);
         }
         let moments = times::coarse(clip, SEARCH_MOMENTS);
-        Self { clip, desc: *desc, jobs, share: 0.5, moments, vertices }
+        Self { clip, desc: desc.clone(), jobs, share: 0.5, moments, vertices }
     }
 
     /// The largest shares that keep the bound at the search's moments: all together first, then one after the other.
     pub fn search(&mut self, gauge: &Gauge) -> Baked {
-        let aim = 0.97 * self.desc.tolerance;
+        let aim = 0.97;
         let mut best = 0.0;
         let (mut low, mut high) = (1e-4, f64::INFINITY);
         for _ in 0..14 {
             self.make_all();
-            let error = gauge.worst(self.clip, &self.assemble(), &self.moments).distance;
+            let error = gauge.worst(self.clip, &self.assemble(), &self.moments).share();
             if error <= aim {
                 (best, low) = (self.share, self.share);
             } else {
@@ -136,7 +136,7 @@ impl<'a> Plan<'a> {
                 self.make(i);
                 if self.jobs[i].keys() < before {
                     work -= 1;
-                    if gauge.worst(self.clip, &self.assemble(), &self.moments).distance <= aim {
+                    if gauge.worst(self.clip, &self.assemble(), &self.moments).share() <= aim {
                         continue;
                     }
                 }

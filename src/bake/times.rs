@@ -33,7 +33,8 @@ pub(super) fn coarse(clip: &Clip, most: usize) -> Vec<f64> {
     all.into_iter().step_by(step).collect()
 }
 
-/// Compare two clips everywhere: the worst that was found, a bound for what was not, and the number of moments.
+/// Compare two clips everywhere: the worst that was found, a bound for what was not as a share of what is allowed, and the number of
+/// moments.
 ///
 /// Between two knots the distance of a vertex is smooth. A maximum of a smooth curve that was sampled at distance `h` hides at most
 /// `h²/8` times its second derivative, which the samples' second differences estimate; twice that is added.
@@ -41,14 +42,12 @@ pub(super) fn verify(gauge: &Gauge, a: &Clip, b: &Clip) -> (Worst, f64, usize) {
     let times = dense(&knots(&[a, b]));
     let found = gauge.profile(a, b, &times);
     let mut moments = times.len();
-    let worst = |list: &[Worst]| {
-        list.iter().copied().fold(Worst::default(), |w, o| if o.distance > w.distance { o } else { w })
-    };
+    let worst = |list: &[Worst]| list.iter().copied().fold(Worst::default(), Worst::worse);
     let mut top = worst(&found);
 
     // Halve the steps around the worst moments until nothing is gained.
     let mut order: Vec<usize> = (0..found.len()).collect();
-    order.sort_by(|&i, &j| found[j].distance.total_cmp(&found[i].distance).then(i.cmp(&j)));
+    order.sort_by(|&i, &j| found[j].share().total_cmp(&found[i].share()).then(i.cmp(&j)));
     order.truncate(CLOSER);
     let around = |i: usize| [times[i.saturating_sub(1)], times[(i + 1).min(times.len() - 1)]];
     let closer: Vec<f64> = order
@@ -61,13 +60,11 @@ pub(super) fn verify(gauge: &Gauge, a: &Clip, b: &Clip) -> (Worst, f64, usize) {
     let more = gauge.profile(a, b, &closer);
     moments += more.len();
     let best = worst(&more);
-    if best.distance > top.distance {
-        top = best;
-    }
-    let bend = |w: &[Worst]| (w[0].distance - 2.0 * w[1].distance + w[2].distance).abs();
-    let near = |w: &&[Worst]| w[1].distance > 0.8 * top.distance;
+    top = top.worse(best);
+    let bend = |w: &[Worst]| (w[0].share() - 2.0 * w[1].share() + w[2].share()).abs();
+    let near = |w: &&[Worst]| w[1].share() > 0.8 * top.share();
     let hidden = more.chunks(15).flat_map(|c| c.windows(3)).filter(near).map(bend).fold(0.0, f64::max);
-    (top, top.distance + 2.0 * hidden / 8.0, moments)
+    (top, top.share() + 2.0 * hidden / 8.0, moments)
 }
 
 /// Knots, and moments between them.

@@ -2,7 +2,7 @@
 
 use super::{Failure, load, print, say::Say};
 use serde_json::{Map, Value, json};
-use sinew::bake::{self, BakeDesc, BakeError, Baked, Gauge, edit};
+use sinew::bake::{self, BakeDesc, BakeError, Baked, Gauge, Metric, Spot, edit};
 use sinew::clip::Clip;
 use sinew::io::picture::{AtomicFile, Folder};
 use sinew::io::{self, Import, Options, gltf};
@@ -32,6 +32,12 @@ pub struct Args {
     /// How far any vertex may be off: metres (0.001, 1m, 2cm, 0.5mm) or a part of the rest pose's diagonal (0.02%).
     #[arg(long, value_name = "LENGTH|PERCENT", default_value = "0.01%", value_parser = tolerance)]
     tolerance: Tolerance,
+    /// What must not stray: every vertex of the skin, or a shell of this radius around every bone (shell:3cm).
+    #[arg(long, value_name = "vertices|shell:LENGTH", default_value = "vertices", value_parser = metric)]
+    metric: Metric,
+    /// A bone whose origin and tip must keep to less, as in LeftFoot=0.01mm; may be given several times.
+    #[arg(long, value_name = "BONE=LENGTH", value_parser = pin)]
+    pin: Vec<(String, f64)>,
     /// Only this clip, by name or index; all of them by default.
     #[arg(long, value_name = "NAME|INDEX")]
     clip: Option<String>,
@@ -131,6 +137,24 @@ fn edited(args: &Args, import: &Import, chosen: &[usize]) -> Result<Vec<(Clip, O
     Ok(out)
 }
 
+fn metres(text: &str) -> Option<f64> {
+    match tolerance(text) {
+        Ok(Tolerance::Metres(m)) => Some(m),
+        _ => None,
+    }
+}
+
+fn metric(text: &str) -> Result<Metric, String> {
+    let shell = text.strip_prefix("shell:").and_then(metres).map(Metric::Shell);
+    let metric = if text == "vertices" { Some(Metric::Vertices) } else { shell };
+    metric.ok_or_else(|| "expected vertices, or shell: and a length, as in shell:3cm".into())
+}
+
+fn pin(text: &str) -> Result<(String, f64), String> {
+    let pin = text.rsplit_once('=').and_then(|(bone, length)| Some((bone.to_owned(), metres(length)?)));
+    pin.ok_or_else(|| "expected a bone and a length, as in LeftFoot=0.01mm".into())
+}
+
 pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     let import = load(&args.input, Options::default(), say)?;
     if import.format != "glTF" {
@@ -149,24 +173,32 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     let threads =
         args.threads.map_or_else(|| std::thread::available_parallelism().map_or(1, Into::into), Into::into);
     let diagonal = Gauge::new(&import.asset.character, threads).diagonal();
+    let pins = args.pin.iter().map(|(name, limit)| {
+        let bone = import.asset.character.skeleton().find(name);
+        let missing =
+            || Failure::Usage(format!("--pin {name}: there is no such bone; `sinew info` lists them"));
+        Ok((bone.ok_or_else(missing)?, *limit))
+    });
+    let pins = pins.collect::<Result<_, _>>()?;
     let metres = match args.tolerance {
         Tolerance::Metres(m) => m,
         Tolerance::OfDiagonal(part) => part * diagonal,
     };
-    let desc = BakeDesc { tolerance: metres, quantize: !args.no_quantize, threads };
+    let desc =
+        BakeDesc { tolerance: metres, metric: args.metric, pins, quantize: !args.no_quantize, threads };
     let clips = edited(args, &import, &chosen)?;
     let bar = say.progress(clips.len());
     let mut done = vec![];
     for (clip, replaces) in &clips {
         let baked = bake::bake(&import.asset.character, clip, &desc).map_err(|e| match e {
             BakeError::Missed { .. } => Failure::Differs(format!("{}: {e}", args.input.display())),
-            BakeError::Tolerance { .. } => Failure::Usage(format!("{}: {e}", args.input.display())),
+            _ => Failure::Usage(format!("{}: {e}", args.input.display())),
         })?;
         done.push(Done { clip, replaces: *replaces, baked });
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let report = report(&import, &done, metres, diagonal);
+    let report = report(&import, &done, args.metric, metres, diagonal);
     write(args, &import, &done, &report)?;
     if args.json {
         return print(format!("{report:#}\n").as_bytes());
@@ -186,11 +218,12 @@ struct Done<'a> {
 }
 
 fn bone_of(import: &Import, b: &Baked) -> String {
-    let (character, worst) = (&import.asset.character, b.report.worst);
-    let bone = character
-        .instances()
-        .get(worst.instance)
-        .and_then(|_| character.bones_of(worst.instance, worst.vertex).next());
+    let character = &import.asset.character;
+    let bone = match b.report.worst.spot {
+        Some(Spot::Vertex { instance, vertex }) => character.bones_of(instance, vertex).next(),
+        Some(Spot::Bone(bone)) => Some(bone),
+        None => None,
+    };
     bone.map_or_else(String::new, |b| character.skeleton().name(b).into())
 }
 
@@ -203,27 +236,40 @@ fn line(import: &Import, done: &Done, diagonal: f64) -> String {
         r.keys[1],
         r.bytes[0],
         r.bytes[1],
-        1e3 * r.ceiling,
-        100.0 * r.ceiling / diagonal.max(1e-30),
+        1e3 * r.ceiling * r.worst.limit,
+        100.0 * r.ceiling * r.worst.limit / diagonal.max(1e-30),
         r.worst.time,
         super::say::name(&bone_of(import, &done.baked)),
     )
 }
 
-fn report(import: &Import, done: &[Done], metres: f64, diagonal: f64) -> Value {
+fn worst(import: &Import, b: &Baked) -> Value {
+    let mut worst = json!({"time": b.report.worst.time, "bone": bone_of(import, b)});
+    if let Some(Spot::Vertex { instance, vertex }) = b.report.worst.spot {
+        (worst["instance"], worst["vertex"]) = (instance.into(), vertex.into());
+    }
+    worst
+}
+
+fn report(import: &Import, done: &[Done], metric: Metric, metres: f64, diagonal: f64) -> Value {
+    let metric_name = match metric {
+        Metric::Vertices => "vertices".to_owned(),
+        Metric::Shell(radius) => format!("shell of {radius} m"),
+    };
     let clips = done.iter().map(|d| {
         let (b, r) = (&d.baked, &d.baked.report);
         json!({
             "clip": d.clip.name,
-            "error": r.ceiling,
+            "error": r.ceiling * r.worst.limit,
             "measured": r.worst.distance,
-            "worst": {"time": r.worst.time, "instance": r.worst.instance, "vertex": r.worst.vertex, "bone": bone_of(import, b)},
+            "limit": r.worst.limit,
+            "worst": worst(import, b),
             "moments": r.moments,
             "keys": r.keys,
             "bytes": r.bytes,
         })
     });
-    json!({"tolerance": metres, "diagonal": diagonal, "metric": "vertices", "clips": clips.collect::<Vec<_>>()})
+    json!({"tolerance": metres, "diagonal": diagonal, "metric": metric_name, "clips": clips.collect::<Vec<_>>()})
 }
 
 fn write(args: &Args, import: &Import, done: &[Done], report: &Value) -> Result<(), Failure> {

@@ -18,7 +18,8 @@ pub fn run(data: &Path) -> Result<(), String> {
             io::import(&data.join("gltf").join(file), &Options::default()).map_err(|e| e.to_string())?;
         let character = &import.asset.character;
         let diagonal = Gauge::new(character, 1).diagonal();
-        let (desc, mut bytes) = (BakeDesc { tolerance: part * diagonal, quantize: true, threads: 2 }, 0);
+        let (desc, mut bytes) =
+            (BakeDesc { tolerance: part * diagonal, threads: 2, ..BakeDesc::default() }, 0);
         for clip in character.clips() {
             let baked = bake(character, clip, &desc).map_err(|e| format!("{file}: {e}"))?;
             bytes += baked.report.bytes[1];
