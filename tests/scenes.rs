@@ -18,7 +18,7 @@ fn scenes_of_the_notes_get_what_they_leave_out() {
     let objects = r#""objects": [{"type": "sphere", "center": [0,0,0], "radius": 0.5}]"#;
     let scene = of_notes(&format!("{{{HEAD}, {objects}}}")).unwrap();
     assert_eq!(scene.lights.len(), 1);
-    assert_eq!(scene.lights[0].source, Source::Directional(glam::DVec3::NEG_Z));
+    assert_eq!(scene.lights[0].source, Source::Point(glam::DVec3::Z * 5.0));
     assert_eq!(scene.materials[scene.shapes[0].material].diffuse, glam::DVec3::splat(0.8));
     assert_eq!(scene.ambient, glam::DVec3::splat(0.1));
 }
@@ -183,7 +183,7 @@ fn both_kinds_of_stl_give_the_same_triangles() {
     assert_eq!(words("solid\nquad"), "STL text, line 2: expected `facet normal` or `endsolid`, found `quad`");
     assert!(
         words(
-            "solid\nfacet normal 0 0 0 outer loop vertex nan 0 0 vertex 0 0 0 vertex 0 0 0 endloop endfacet"
+            "solid\nfacet normal 0 0 0 outer loop vertex nan 0 0 vertex 0 0 0 vertex 0 0 0 endloop endfacet\nendsolid"
         )
         .contains("finite")
     );
@@ -284,6 +284,110 @@ fn channels_of_shards_are_those_of_the_whole() {
     let list = text(&bytes("all.json".into()));
     assert!(list.contains("w.3.position.png"), "{list}");
     assert!(sinew(&["manifest", "check", &manifest]).status.success());
+}
+
+fn shipped(name: &str) -> String {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("rigs/scenes").join(name);
+    file.to_str().expect("UTF-8").into()
+}
+
+/// Run and expect success; what was said.
+fn does(args: &[&str]) -> String {
+    let out = sinew(args);
+    assert!(out.status.success(), "{args:?}: {}", text(&out.stderr));
+    text(&out.stderr)
+}
+
+#[test]
+fn options_that_do_not_go_together_say_so() {
+    let (dir, input) = folder();
+    let (out, scene) = (path(&dir, "a.png"), path(&dir, "notes.json"));
+    std::fs::write(&scene, format!("{{{HEAD}, \"objects\": []}}")).unwrap();
+    for (input, more, message) in [
+        (
+            &input,
+            "--precision f64",
+            "--precision is for rays, and the rasterizer draws this; add --renderer ray",
+        ),
+        (&input, "--renderer raster --budget 2s", "--budget is for rays"),
+        (&input, "--samples 9", "--samples 9: the rasterizer takes 1 or 4"),
+        (&input, "--renderer ray --budget soon", "expected a time as in 2s, 500ms or 1.5min"),
+        (&input, "--renderer ray --adaptive 2", "expected a share of white"),
+        (&input, "--renderer ray --samples 0", "1..=65536"),
+        (&input, "--channels id --sheet grid", "sheets have --maps"),
+        (&scene, "--renderer hybrid", "scenes of the notes are drawn by rays alone"),
+        (&scene, "--camera front", "has its own camera"),
+        (&scene, "--light sun", "has its own light and materials"),
+        (&scene, "--contact 2x2", "does not move"),
+    ] {
+        let words: Vec<&str> = more.split(' ').collect();
+        let (code, found) = fails(&[&["render", input, "-o", &out], &words[..]].concat());
+        assert!(code == 2 && found.contains(message), "{more}: {code} {found}");
+    }
+    assert!(!Path::new(&out).exists());
+}
+
+#[test]
+fn rays_give_the_same_bytes_whatever_the_threads() {
+    let dir = tempfile::tempdir().unwrap();
+    let draw = |name: &str, scene: &str, more: &[&str]| {
+        let out = path(&dir, name);
+        does(&[&["render", &shipped(scene), "-o", &out, "-f", "--size", "64x48"], more].concat());
+        std::fs::read(out).unwrap()
+    };
+    let glass = |more: &[&str]| draw("a.png", "glass.json", more);
+    let one = glass(&["--samples", "4", "--threads", "1"]);
+    assert!(glass(&["--samples", "4", "--threads", "2"]) == one);
+    assert!(glass(&["--samples", "4", "--seed", "1"]) != one);
+    assert!(glass(&["--samples", "4", "--ray-depth", "0"]) != one);
+    assert!(glass(&["--samples", "4", "--shadow", "none"]) != one);
+    let few = ["--adaptive", "0.05", "--samples", "32"];
+    let adaptive = glass(&[&few[..], &["--threads", "1"]].concat());
+    assert!(glass(&[&few[..], &["--threads", "2"]].concat()) == adaptive);
+    // Films draw many pictures at a time.
+    let film = |threads: &str| {
+        let more = ["--samples", "1", "--frames", "1-3", "--threads", threads];
+        draw("a.gif", "mirror-floor.json", &more)
+    };
+    assert!(film("1") == film("2"));
+}
+
+#[test]
+fn a_budget_ends_a_picture_that_would_take_hours() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = path(&dir, "a.png");
+    let said = does(&["render", &shipped("glass.json"), "-o", &out, "--size", "32", "--budget", "50ms"]);
+    let (_, mean) = said.split_once("a.png\n").expect(&said);
+    let mean: f64 = mean.split(' ').next().and_then(|n| n.parse().ok()).expect(&said);
+    assert!((1.0..60000.0).contains(&mean), "{said}");
+    assert_eq!(codes(&out).to_rgba8().dimensions(), (32, 32));
+}
+
+#[test]
+fn rays_cover_what_their_channels_say() {
+    let dir = tempfile::tempdir().unwrap();
+    let rig = Path::new(env!("CARGO_MANIFEST_DIR")).join("rigs/fox.json");
+    let out = path(&dir, "a.png");
+    let args = ["render", rig.to_str().unwrap(), "-o", &out, "--size", "96", "--background", "transparent"];
+    let more = ["--renderer", "ray", "--samples", "1", "--channels", "id,bone,depth,normal"];
+    does(&[&args[..], &more].concat());
+    let picture = codes(&out).to_rgba8();
+    let file = |name: &str| codes(&path(&dir, &format!("a.{name}.png")));
+    let (id, bone, normal) = (file("id").to_rgba8(), file("bone").to_rgba8(), file("normal").to_rgba8());
+    let depth = file("depth").to_luma16();
+    let (mut covered, mut differ) = (0, 0);
+    for (x, y, p) in picture.enumerate_pixels() {
+        let there = id.get_pixel(x, y)[3] > 0;
+        for other in
+            [bone.get_pixel(x, y)[3] > 0, normal.get_pixel(x, y)[3] > 0, depth.get_pixel(x, y)[0] > 0]
+        {
+            assert_eq!(other, there, "{x} {y}");
+        }
+        covered += usize::from(there);
+        differ += usize::from(there != (p[3] > 0));
+    }
+    assert!(covered > 1000);
+    assert_eq!(differ, 0, "of {covered}");
 }
 
 #[test]

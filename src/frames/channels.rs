@@ -3,8 +3,9 @@
 use super::fit::{self, Span};
 use super::{FrameStats, Moment, Shot, Worker};
 use crate::character::{Binding, Character, Instance};
+use crate::render::Renderer;
 use crate::render::channel::{Channel, Channels};
-use crate::scene::{AlphaMode, Material, Scene};
+use crate::scene::{AlphaMode, Geometry, Material, Scene};
 use glam::{DVec3, Vec3, Vec3A};
 
 /// Half an 8-bit step: whatever blends with more than that is visible.
@@ -13,9 +14,9 @@ const VISIBLE: f32 = 0.5 / 255.0;
 /// Where the pixels of a shot can be.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Extent {
-    /// Corners of a box around all vertices, world space.
+    /// Corners of a box around all vertices, and around shapes that have an end where rays draw, world space.
     pub bounds: [DVec3; 2],
-    /// Least and greatest distance of a vertex along the view direction, metres.
+    /// Least and greatest distance of these along the view direction, metres.
     pub depth: [f32; 2],
 }
 
@@ -26,12 +27,15 @@ impl Shot<'_> {
         let (mut low, mut high) = (Vec3A::INFINITY, Vec3A::NEG_INFINITY);
         let (mut near, mut far) = (f32::INFINITY, f32::NEG_INFINITY);
         let span = Span { asset: self.asset, clip: self.desc.clip, center: self.center };
+        let drawn = if self.desc.renderer == Renderer::Raster { &[] } else { &self.shapes[..] };
+        let shapes: Vec<Vec3> = drawn.iter().flat_map(|s| ends(&s.geometry)).collect();
         for t in fit::times(&span).0 {
             self.pose(t, worker, &mut FrameStats::default());
             let camera = self.stand.camera(t.into(), &worker.posed, &worker.deformed);
             let (eye, back) = (camera.scene_from_view.translation, camera.scene_from_view.matrix3.z_axis);
             let axis = self.stand.turns().map(Vec3A::from);
-            for p in worker.deformed.iter().flat_map(|d| &d.positions).filter(|p| p.is_finite()) {
+            let vertices = worker.deformed.iter().flat_map(|d| &d.positions).chain(&shapes);
+            for p in vertices.filter(|p| p.is_finite()) {
                 let p = Vec3A::from(*p);
                 (low, high) = (low.min(p), high.max(p));
                 // A camera that walks around sees the point anywhere on a circle.
@@ -87,6 +91,18 @@ impl Shot<'_> {
             seen.for_each(|(p, _)| *p = (self.center + p.as_dvec3()).as_vec3());
         }
         stats
+    }
+}
+
+/// Points that reach as far as a shape does, if it has an end.
+fn ends(geometry: &Geometry) -> Vec<Vec3> {
+    match *geometry {
+        Geometry::Sphere { center, radius } => {
+            let corner = |k: u32| DVec3::from_array([0, 1, 2].map(|c| f64::from(k >> c & 1) * 2.0 - 1.0));
+            (0..8).map(|k| (center + corner(k) * radius).as_vec3()).collect()
+        }
+        Geometry::Plane { .. } => Vec::new(),
+        Geometry::Triangle(corners) => corners.map(|c| c.as_vec3()).to_vec(),
     }
 }
 

@@ -143,7 +143,7 @@ fn plan(args: &Args, task: &Task) -> Result<Plan, Failure> {
 fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -> Result<Written, Failure> {
     if let Some(Setting::Notes(scene)) = &task.import.setting {
         let written = shapes::draw(args, task, plan, scene, say)?;
-        say_samples(args, &written, 1, say);
+        say_samples(args, &written, plan.size[0] * plan.size[1], say);
         totals.add(&written, 1);
         return Ok(written);
     }
@@ -173,7 +173,7 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
     let alone = plan.frames.len() == 1 && !one_picture;
     let settings =
         args.sheet.settings(args.output.settings(usual_size(task.import), args.renderer.coverage())?)?;
-    let settings = Settings { threads: if alone { threads } else { 1 }, ..settings };
+    let mut settings = Settings { threads: if alone { threads } else { 1 }, ..settings };
     let look = args.look.look(asset, scene.map(|s| &s.look), |m| say.warn(m))?;
     let renderer =
         args.renderer.renderer(&look, &props, scene, args.sheet.pixels.is_on(), args.look.has_shadows())?;
@@ -182,6 +182,10 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
             "the rasterizer leaves {} shapes out; --renderer ray draws them",
             props.shapes.len()
         ));
+    }
+    if renderer.rays().is_some_and(|r| r.samples <= 1) {
+        // Channels look where the picture does.
+        settings.samples = 1;
     }
     let desc = ShotDesc {
         renderer,
@@ -235,15 +239,15 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         job.bar.finish_and_clear();
         written?
     };
-    say_samples(args, &written, frames, say);
+    say_samples(args, &written, frames * shot.size()[0] * shot.size()[1], say);
     totals.add(&written, frames);
     Ok(written)
 }
 
 /// Say how many samples pictures got that time ended.
-fn say_samples(args: &Args, written: &Written, frames: usize, say: &Say) {
-    let ended = args.renderer.budget.is_some() || say.verbose;
-    if let Some(samples) = renderer::reached(written.drawn.rays.samples, frames).filter(|_| ended) {
+fn say_samples(args: &Args, written: &Written, pixels: usize, say: &Say) {
+    let ended = args.renderer.ends_early() || say.verbose;
+    if let Some(samples) = renderer::reached(&written.drawn.rays, pixels).filter(|_| ended) {
         say.note(&samples);
     }
 }

@@ -3,7 +3,7 @@
 use crate::cli::Failure;
 use sinew::frames::{Look, Props};
 use sinew::io::scene::ours::SceneFile;
-use sinew::render::ray::{Precision, RaySettings};
+use sinew::render::ray::{Outcome, Precision, RaySettings};
 use sinew::render::{Renderer, Watch};
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
@@ -27,7 +27,7 @@ pub struct RendererArgs {
     /// Rays: compute in f32 (fast) or f64 (for reference; what scenes of the notes get if not said).
     #[arg(long, value_name = "f32|f64")]
     precision: Option<Width>,
-    /// Rays: follow light through so many mirrors and glass surfaces, 0 to 64; 8 if not said.
+    /// Rays: follow light through so many mirrors and glass surfaces, 0 to 64; 8 if not said, 10 for scenes of the notes.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=64))]
     ray_depth: Option<u32>,
     /// Rays: leave a pixel once its standard error is below this share of white, as in 0.005; --samples is then the most.
@@ -52,6 +52,11 @@ enum Width {
 }
 
 impl RendererArgs {
+    /// Whether pictures may have fewer samples than they could.
+    pub fn ends_early(&self) -> bool {
+        self.budget.is_some() || self.adaptive.is_some()
+    }
+
     /// Samples of the rasterizer's, for whatever it draws.
     pub fn coverage(&self) -> u8 {
         if self.samples == Some(1) { 1 } else { 4 }
@@ -95,7 +100,11 @@ impl RendererArgs {
     pub fn of_notes(&self) -> Result<RaySettings, Failure> {
         match self.renderer {
             // Nothing is too faint to be followed.
-            None | Some(Kind::Ray) => Ok(RaySettings { cutoff: 0.0, ..self.rays(1, Precision::F64) }),
+            None | Some(Kind::Ray) => Ok(RaySettings {
+                cutoff: 0.0,
+                depth: self.ray_depth.unwrap_or(10),
+                ..self.rays(1, Precision::F64)
+            }),
             Some(_) => Err(Failure::Usage(
                 "--renderer: scenes of the notes are drawn by rays alone; expected ray, or leave it out"
                     .into(),
@@ -104,10 +113,9 @@ impl RendererArgs {
     }
 
     fn rays(&self, usual: u32, precision: Precision) -> RaySettings {
-        let open = self.budget.is_some() || self.adaptive.is_some();
         let plain = RaySettings::default();
         RaySettings {
-            samples: self.samples.unwrap_or(if open { ENOUGH } else { usual }),
+            samples: self.samples.unwrap_or(if self.ends_early() { ENOUGH } else { usual }),
             seed: self.seed.unwrap_or(plain.seed),
             error: self.adaptive,
             depth: self.ray_depth.unwrap_or(plain.depth),
@@ -168,10 +176,9 @@ pub fn watch(budget: Option<Duration>, bar: indicatif::ProgressBar) -> Watch {
 }
 
 /// What to say of the samples that pictures got.
-pub fn reached(samples: u32, frames: usize) -> Option<String> {
-    let least = if frames > 1 { "at least " } else { "" };
-    let s = if samples == 1 { "" } else { "s" };
-    (samples > 0).then(|| format!("{least}{samples} sample{s} a pixel"))
+pub fn reached(rays: &Outcome, pixels: usize) -> Option<String> {
+    let mean = rays.count.primary as f64 / pixels.max(1) as f64;
+    (rays.samples > 0).then(|| format!("{mean:.1} samples a pixel on average"))
 }
 
 fn parse_error(text: &str) -> Result<f64, String> {

@@ -10,7 +10,7 @@ use sinew::image::depth::Rounding;
 use sinew::image::{Image, Rgba8};
 use sinew::io::manifest::sha256;
 use sinew::io::picture::{
-    AtomicFile, ExrDepth, Folder, Format, Output, encode_exr_layers, encode_png, encode_webp,
+    AtomicFile, ExrDepth, Folder, Format, Output, Target, encode_exr_layers, encode_png, encode_webp,
 };
 use sinew::render::Settings;
 use sinew::render::channel::Channels;
@@ -33,13 +33,15 @@ pub fn draw(
     scene: &ShapeScene,
     say: &Say,
 ) -> Result<Written, Failure> {
-    check(args, task)?;
+    check(args, task, plan)?;
     let ray = args.renderer.of_notes()?;
     let [width, height] = plan.size;
     let settings = Settings { width, height, samples: 4, threads: args.output.threads() };
     let format = task.target.format();
-    let path = task.target.path_of(1);
-    let beside_files = args.channels.files(task.target, 1);
+    let number = plan.frames.first().map_or(1, |f| f.number);
+    let path = task.target.path_of(number);
+    let beside_files = args.channels.files(task.target, number);
+    let folder = if matches!(task.target, Target::Sequence(..)) { Folder::Create } else { Folder::MustExist };
     if !args.output.force
         && let Some(there) = path.iter().chain(&beside_files).find(|p| p.exists())
     {
@@ -81,10 +83,9 @@ pub fn draw(
         Some(path) => {
             for (name, bytes) in &files {
                 written.bytes += bytes.len() as u64;
-                AtomicFile::write(name.file(path), bytes, args.output.force, Folder::MustExist)
-                    .map_err(failed)?;
+                AtomicFile::write(name.file(path), bytes, args.output.force, folder).map_err(failed)?;
             }
-            AtomicFile::write(path, &bytes, args.output.force, Folder::MustExist).map_err(failed)?;
+            AtomicFile::write(path, &bytes, args.output.force, folder).map_err(failed)?;
             say.note(&format!("wrote {}", path.display()));
         }
         None => {
@@ -97,14 +98,14 @@ pub fn draw(
 }
 
 /// Refuse what such a scene has no use for.
-fn check(args: &Args, task: &Task) -> Result<(), Failure> {
+fn check(args: &Args, task: &Task, plan: &Plan) -> Result<(), Failure> {
     let usage =
         |what: &str| Err(Failure::Usage(format!("{}: a scene of the notes {what}", task.input.display())));
     if args.sheet.is_one_picture() || args.sheet.pixels.is_on() {
         return usage("does not move: there is nothing to make a sheet or pixel art of");
     }
-    if task.target.is_film(1) {
-        return usage("does not move; expected a name that ends in .png, .webp or .exr");
+    if task.target.is_film(1) || plan.frames.len() > 1 {
+        return usage("does not move: expected one picture, in a name that ends in .png, .webp or .exr");
     }
     if !args.camera.is_default() || args.camera.eye.is_some() || args.camera.turntable.is_some() {
         return usage("has its own camera; leave --camera, --eye and --turntable out");

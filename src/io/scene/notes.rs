@@ -70,7 +70,7 @@ enum Object {
 
 /// Read a scene of the notes, with the folder in which its STL files lie.
 ///
-/// Without lights there is one that shines where the camera looks; objects without a material are light grey.
+/// Without lights there is one at the eye; objects without a material are light grey.
 ///
 /// # Errors
 /// [`SceneError`]: where, what was expected, what was found.
@@ -84,7 +84,7 @@ pub fn from_bytes(bytes: &[u8], folder: &Path) -> Result<ShapeScene, SceneError>
     let mut lights: Vec<ShapeLight> =
         file.lights.iter().enumerate().map(|(i, l)| light(i, l)).collect::<Result<_, _>>()?;
     if file.lights.is_empty() {
-        let source = Source::Directional(DVec3::from_array(file.camera.look));
+        let source = Source::Point(DVec3::from_array(file.camera.eye));
         lights.push(ShapeLight { source, color: DVec3::splat(0.9), radius: 0.0 });
     }
     let mut scene = ShapeScene {
