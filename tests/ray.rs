@@ -279,7 +279,6 @@ mod characters {
     use sinew::frames::{Look, Shot, ShotDesc, View, Worker};
     use sinew::io::{self, Import, Options};
     use sinew::render::channel::{Channel, Channels};
-    use sinew::scene::AlphaMode;
     use std::path::PathBuf;
 
     /// What a renderer makes of one moment.
@@ -304,18 +303,11 @@ mod characters {
         assert!(files.len() >= 6);
         for file in &files {
             let import = io::import(file, &Options { textures: true }).unwrap();
-            let mut opaque = import.clone();
-            let blending = opaque.asset.materials.iter_mut().filter(|m| m.alpha == AlphaMode::Blend);
-            blending.for_each(|m| m.alpha = AlphaMode::Opaque);
             for (clip, time) in [(None, 0.0), (Some(0), 0.3), (Some(0), 0.9)] {
                 let what = format!("{}, {clip:?}, {time} s", file.display());
                 let rays = Renderer::Ray(RaySettings { shadows: false, ..Default::default() });
-                let solid = draw(&opaque, clip, time, Renderer::Raster);
-                compare(&what, &solid, &draw(&opaque, clip, time, rays), &solid.1, 0);
-                if import.asset.materials.iter().any(|m| m.alpha == AlphaMode::Blend) {
-                    let by = |renderer| draw(&import, clip, time, renderer);
-                    compare(&what, &by(Renderer::Raster), &by(rays), &solid.1, 2);
-                }
+                let by = |renderer| draw(&import, clip, time, renderer);
+                compare(&what, &by(Renderer::Raster), &by(rays));
             }
         }
     }
@@ -325,18 +317,16 @@ mod characters {
         [0, w, 2 * w].into_iter().flat_map(move |row| (0..3).map(move |k| (i + row + k).wrapping_sub(w + 1)))
     }
 
-    /// Off silhouettes, where a pixel's neighbours are something else or lie apart (of what blends, too), and off a texture's seams, pictures are the same to one code,
-    /// depths to 1e-4. Silhouettes behind what blends are in no channel: where they are, pixels may differ: in `hidden` of them at most.
-    fn compare(what: &str, a: &(Image, Channels), b: &(Image, Channels), layers: &Channels, hidden: usize) {
+    /// Off silhouettes, where a pixel's neighbours are something else or lie apart, pictures are the same to one code, depths to 1e-4.
+    /// In slivers the two find other mip levels, as the rasterizer pulls points in that its snapping has put outside: that is a pixel
+    /// or two.
+    fn compare(what: &str, a: &(Image, Channels), b: &(Image, Channels)) {
         let apart = |c: &Channels, i: usize, j: usize| {
             let z = c.depth[i];
-            j >= c.objects.len()
-                || c.objects[j] != c.objects[i]
-                || (c.depth[j] - z).abs() > 0.01 * z
-                || c.uvs[j].distance(c.uvs[i]) > 0.2
+            j >= c.objects.len() || c.objects[j] != c.objects[i] || (c.depth[j] - z).abs() > 0.01 * z
         };
-        let edge = |i: usize| around(i, a.1.width).any(|j| apart(&a.1, i, j) || apart(layers, i, j));
-        let (mut compared, mut differ) = (0, 0);
+        let edge = |i: usize| around(i, a.1.width).any(|j| apart(&a.1, i, j));
+        let (mut compared, mut slivers) = (0, 0);
         for i in (0..a.1.objects.len()).filter(|&i| !edge(i)) {
             compared += usize::from(a.1.objects[i] > 0);
             let (z, y) = (a.1.depth[i], b.1.depth[i]);
@@ -344,9 +334,9 @@ mod characters {
             assert_eq!(a.1.labels[i], b.1.labels[i], "{what}: label of pixel {i}");
             assert!(z == y || (z - y).abs() < 1e-4 * z, "{what}: pixel {i} is {z} and {y} away");
             let (p, q) = (a.0.pixels[i], b.0.pixels[i]);
-            differ += usize::from((0..4).any(|c| (p[c] - q[c]).abs() > 1.0 / 255.0));
-            assert!(differ <= hidden, "{what}: pixel {i}: {p:?} {q:?}");
+            slivers += usize::from((0..4).any(|c| (p[c] - q[c]).abs() > 1.0 / 255.0));
         }
+        assert!(slivers <= 2, "{what}: {slivers} pixels differ");
         assert!(compared > 300, "{what}: {compared} pixels");
     }
 }
