@@ -305,17 +305,17 @@ mod characters {
         for file in &files {
             let import = io::import(file, &Options { textures: true }).unwrap();
             let mut opaque = import.clone();
-            opaque.asset.materials.iter_mut().for_each(|m| m.alpha = AlphaMode::Opaque);
+            let blending = opaque.asset.materials.iter_mut().filter(|m| m.alpha == AlphaMode::Blend);
+            blending.for_each(|m| m.alpha = AlphaMode::Opaque);
             for (clip, time) in [(None, 0.0), (Some(0), 0.3), (Some(0), 0.9)] {
-                let by = |renderer| draw(&import, clip, time, renderer);
-                let rays = by(Renderer::Ray(RaySettings { shadows: false, ..Default::default() }));
-                let (_, layers) = draw(&opaque, clip, time, Renderer::Raster);
-                compare(
-                    &format!("{}, {clip:?}, {time} s", file.display()),
-                    &by(Renderer::Raster),
-                    &rays,
-                    &layers,
-                );
+                let what = format!("{}, {clip:?}, {time} s", file.display());
+                let rays = Renderer::Ray(RaySettings { shadows: false, ..Default::default() });
+                let solid = draw(&opaque, clip, time, Renderer::Raster);
+                compare(&what, &solid, &draw(&opaque, clip, time, rays), &solid.1, 0);
+                if import.asset.materials.iter().any(|m| m.alpha == AlphaMode::Blend) {
+                    let by = |renderer| draw(&import, clip, time, renderer);
+                    compare(&what, &by(Renderer::Raster), &by(rays), &solid.1, 2);
+                }
             }
         }
     }
@@ -326,14 +326,14 @@ mod characters {
     }
 
     /// Off silhouettes, where a pixel's neighbours are something else or lie apart (of what blends, too), pictures are the same to one code,
-    /// depths to 1e-4.
-    fn compare(what: &str, a: &(Image, Channels), b: &(Image, Channels), layers: &Channels) {
+    /// depths to 1e-4. Silhouettes behind what blends are in no channel: where they are, pixels may differ: in `hidden` of them at most.
+    fn compare(what: &str, a: &(Image, Channels), b: &(Image, Channels), layers: &Channels, hidden: usize) {
         let apart = |c: &Channels, i: usize, j: usize| {
             let z = c.depth[i];
             j >= c.objects.len() || c.objects[j] != c.objects[i] || (c.depth[j] - z).abs() > 0.01 * z
         };
         let edge = |i: usize| around(i, a.1.width).any(|j| apart(&a.1, i, j) || apart(layers, i, j));
-        let mut compared = 0;
+        let (mut compared, mut differ) = (0, 0);
         for i in (0..a.1.objects.len()).filter(|&i| !edge(i)) {
             compared += usize::from(a.1.objects[i] > 0);
             let (z, y) = (a.1.depth[i], b.1.depth[i]);
@@ -341,7 +341,8 @@ mod characters {
             assert_eq!(a.1.labels[i], b.1.labels[i], "{what}: label of pixel {i}");
             assert!(z == y || (z - y).abs() < 1e-4 * z, "{what}: pixel {i} is {z} and {y} away");
             let (p, q) = (a.0.pixels[i], b.0.pixels[i]);
-            assert!((0..4).all(|c| (p[c] - q[c]).abs() < 1.0 / 255.0), "{what}: pixel {i}: {p:?} {q:?}");
+            differ += usize::from((0..4).any(|c| (p[c] - q[c]).abs() > 1.0 / 255.0));
+            assert!(differ <= hidden, "{what}: pixel {i}: {p:?} {q:?}");
         }
         assert!(compared > 300, "{what}: {compared} pixels");
     }

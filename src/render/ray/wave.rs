@@ -3,10 +3,16 @@
 use super::coat::{Alpha, Batch, Dressed};
 use super::optics;
 use super::sampler;
-use super::stage::{Finish, Hit, Real, Spot, Stage};
+use super::stage::{Finish, Hit, Real, Spot, Stage, ToLamp};
 use super::{RayCount, RaySettings};
 use crate::render::shade::LampKind;
 use glam::{DVec3, Vec3};
+
+/// The least that light counts which has met glass.
+const FAINT: f64 = 1e-4;
+
+/// Rays of a tile that are on their way at once, at most: surfaces that give back more than they get stop here.
+const MOST: usize = 1 << 18;
 
 /// A ray that is on its way to a pixel, and what its light counts there.
 #[derive(Clone, Copy, Debug)]
@@ -35,6 +41,7 @@ pub(super) struct Wave {
     next: Vec<Path>,
     hits: Vec<(Hit, u32)>,
     reached: Vec<[DVec3; 8]>,
+    sent: Vec<(usize, ToLamp)>,
     pub count: RayCount,
     /// Light and alpha, a pixel of the tile each.
     pub sums: Vec<[f64; 4]>,
@@ -108,14 +115,16 @@ impl Wave {
         // How much of each lamp arrives?
         self.reached.clear();
         if here.settings.shadows && dressed.takes_light() {
-            let count = &mut self.count;
-            self.reached.extend((0..stage.lamps.len()).map(|lamp| {
-                let share = |k: usize, count: &mut RayCount| match k < run.len() {
-                    true => arriving(stage, here, &batch, &dressed, lamp, k, count),
-                    false => DVec3::ONE,
-                };
-                std::array::from_fn(|k| share(k, count))
-            }));
+            for lamp in 0..stage.lamps.len() {
+                self.sent.clear();
+                let rays = (0..run.len()).map(|k| (k, to_lamp(stage, here, &batch, &dressed, lamp, k)));
+                self.sent.extend(rays.filter_map(|(k, ray)| Some((k, ray?))));
+                self.count.shadow += self.sent.len() as u64;
+                let rays: Vec<ToLamp> = self.sent.iter().map(|s| s.1).collect();
+                let (shares, mut reached) = (stage.passing(&rays, object), [DVec3::ZERO; 8]);
+                self.sent.iter().zip(shares).for_each(|((k, _), share)| reached[*k] = share);
+                self.reached.push(reached);
+            }
         }
         let colors = stage.coat.light(stage.isa, &dressed, &stage.lamps, &self.reached);
 
@@ -150,14 +159,16 @@ impl Wave {
         finish: &Finish,
         alpha: f64,
     ) {
-        let settings = here.settings;
+        // Each meeting with glass makes two rays of one; those that are too faint are left out whatever the settings say.
+        let least = if finish.is_glass() { FAINT } else { 0.0 };
+        let cutoff = here.settings.cutoff.max(least);
         if alpha < 1.0 {
             // The same ray, from the next number on: what is seen through a surface does not move.
             let near = next_up::<R>(hit.t);
             let (weight, cover) = (path.weight * (1.0 - alpha), path.cover * (1.0 - alpha));
-            self.push(settings, Path { near, weight, cover, ..*path });
+            self.push(cutoff, Path { near, weight, cover, ..*path });
         }
-        let ends = path.bounce >= settings.depth;
+        let ends = path.bounce >= here.settings.depth;
         if ends || !finish.is_glass() && finish.mirror.max_element() <= 0.0 {
             let rest = if finish.is_glass() { path.cover * alpha } else { 0.0 };
             return add(&mut self.sums[path.place as usize], DVec3::ZERO, rest);
@@ -182,24 +193,24 @@ impl Wave {
         let mirrored = if level.dot(face) > 0.0 { level } else { optics::mirrored(d, face) };
         let turned = [dx, dy].map(|v| optics::mirrored(v.as_dvec3(), face).as_vec3());
         if finish.mirror.max_element() > 0.0 {
-            self.push(settings, on(mirrored, turned, finish.mirror, 0.0));
+            self.push(cutoff, on(mirrored, turned, finish.mirror, 0.0));
         }
         if finish.is_glass() {
             let bent = optics::refracted(d, n, if hit.back { finish.ior } else { 1.0 / finish.ior });
             let bent = bent.filter(|b| b.0.dot(face) < 0.0);
             let share = bent.map_or(1.0, |b| b.1);
             add(&mut self.sums[path.place as usize], DVec3::ZERO, path.cover * share * alpha);
-            self.push(settings, on(mirrored, turned, DVec3::splat(share), 0.0));
+            self.push(cutoff, on(mirrored, turned, DVec3::splat(share), 0.0));
             if let Some((t, share)) = bent {
                 let cover = path.cover * (1.0 - share) * alpha;
-                self.push(settings, on(t, [dx, dy], finish.transmission * (1.0 - share), cover));
+                self.push(cutoff, on(t, [dx, dy], finish.transmission * (1.0 - share), cover));
             }
         }
     }
 
     /// Send a ray on if its light still counts.
-    fn push(&mut self, settings: &RaySettings, path: Path) {
-        if path.weight.max_element().max(path.cover) > settings.cutoff {
+    fn push(&mut self, cutoff: f64, path: Path) {
+        if path.weight.max_element().max(path.cover) > cutoff && self.next.len() < MOST {
             self.next.push(path);
         }
     }
@@ -235,16 +246,15 @@ fn carried(path: &Path, t: f64, face: DVec3) -> [Vec3; 4] {
     [run(ox, dx), run(oy, dy), turn(dx), turn(dy)]
 }
 
-/// The share of a lamp's light that arrives at one hit.
-fn arriving<R: Real>(
+/// The ray from a hit to a lamp; none where the surface is turned away: it gets nothing, whatever lies between.
+fn to_lamp<R: Real>(
     stage: &Stage<R>,
     here: Here,
     batch: &Batch,
     dressed: &Dressed<R>,
     lamp: usize,
     k: usize,
-    count: &mut RayCount,
-) -> DVec3 {
+) -> Option<ToLamp> {
     let (path, hit, spot) = (&batch.paths[k], &batch.hits[k], &batch.spots[k]);
     let light = &stage.lamps[lamp];
     // Where in the lamp: its middle, unless it has a size and there is more than one sample.
@@ -261,21 +271,23 @@ fn arriving<R: Real>(
         let x = axis.any_orthonormal_vector();
         (x * a + axis.cross(x) * b) * radius
     };
-    let (point, far) = match light.kind {
+    let (towards, far) = match light.kind {
         LampKind::Directional { towards } => (towards.wide(), f64::INFINITY),
         LampKind::Point { position, .. } | LampKind::Spot { position, .. } => {
             (position.wide() - spot.position, 1.0)
         }
     };
-    let direction = point + aside(point.normalize_or(DVec3::Y));
-    // What is turned away gets nothing, whatever lies between.
-    if stage.coat.gated() && dressed.normal(k).dot(point) <= 0.0 {
-        return DVec3::ZERO;
+    let normal = dressed.normal(k);
+    if stage.coat.gated() && normal.dot(towards) <= 0.0 {
+        return None;
     }
-    count.shadow += 1;
-    let origin = spot.leave(direction);
-    let direction = if far < f64::INFINITY { direction + (spot.position - origin) } else { direction };
-    stage.passing(origin, direction, far, hit.object)
+    let towards = towards + aside(towards.normalize_or(DVec3::Y));
+    let origin = match batch.body.and_then(|b| b.lift(hit.triangle, spot, normal)) {
+        Some(lift) => spot.leave(normal) + lift,
+        None => spot.leave(towards),
+    };
+    let direction = if far < f64::INFINITY { towards + (spot.position - origin) } else { towards };
+    Some(ToLamp { origin, direction, far })
 }
 
 /// From the unit square onto the unit disc, areas kept (Shirley and Chiu 1997).
