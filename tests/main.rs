@@ -20,6 +20,7 @@ mod looks;
 #[cfg(feature = "pictures")]
 mod picture;
 mod raster;
+mod ray;
 #[path = "../src/test_rng.rs"]
 mod rng;
 #[cfg(feature = "cli")]

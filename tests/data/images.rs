@@ -13,7 +13,7 @@ use sinew::image::hue::{Hsv, desaturate, gray, shift_hue};
 use sinew::io::picture::frames_of;
 use std::path::Path;
 
-fn load(file: &Path) -> Result<Rgba8, String> {
+pub fn load(file: &Path) -> Result<Rgba8, String> {
     let named = |e: &dyn std::fmt::Display| format!("{}: {e}", file.display());
     let bytes = std::fs::read(file).map_err(|e| named(&e))?;
     let mut frames = frames_of(&bytes).map_err(|e| named(&e))?;

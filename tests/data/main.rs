@@ -8,6 +8,7 @@ mod gltf_oracle;
 mod images;
 mod invalid;
 mod notes;
+mod rays;
 #[path = "../../src/test_rng.rs"]
 mod rng;
 mod scenes;
@@ -47,6 +48,8 @@ const TESTS: &[(&str, Test)] = &[
     ("notes::hues_are_those_of_the_notes", images::hues_are_those_of_the_notes),
     ("notes::layers_are_composited_as_in_the_notes", images::layers_are_composited_as_in_the_notes),
     ("notes::every_scene_is_drawn", scenes::every_scene_is_drawn),
+    ("notes::cast_rays_meet_what_they_do_in_the_notes", rays::cast_rays_meet_what_they_do_in_the_notes),
+    ("notes::traced_rays_bring_the_light_of_the_notes", rays::traced_rays_bring_the_light_of_the_notes),
     ("changed_bytes_never_panic", gltf_mutations::run),
     ("broken_files_are_refused_politely", invalid::run),
     ("the_program_survives_broken_files", invalid::program),

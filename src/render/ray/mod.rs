@@ -170,7 +170,7 @@ impl Tracer {
         Self { isa, ..Self::default() }
     }
 
-    /// Draw this part of pictures alone, as [`Rasterizer::set_window`](super::raster::Rasterizer::set_window) does.
+    /// Draw this part of pictures alone, as [`Painter::set_window`](super::Painter::set_window) does.
     pub fn set_window(&mut self, window: Option<Window>) {
         self.window = window;
     }
@@ -218,7 +218,7 @@ impl Tracer {
         outcome
     }
 
-    /// Draw what the pixels show beside their colour, as [`Rasterizer::draw_channels`](super::raster::Rasterizer::draw_channels)
+    /// Draw what the pixels show beside their colour, as [`Painter::draw_channels`](super::Painter::draw_channels)
     /// does, by its samples; shapes are numbered after the scene's objects.
     ///
     /// # Panics

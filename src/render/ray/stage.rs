@@ -18,8 +18,28 @@ pub(super) trait Real: lanes::Real + accel::Real {
     fn kept(v: DVec3) -> DVec3 {
         V3::<Self>::of(v).wide()
     }
+
+    /// Which of some rays `accept` takes a hit of, a bit each.
+    fn blocked(
+        world: &World,
+        rays: &[accel::Ray<Self>],
+        accept: impl Fn(usize, &accel::Hit<Self>) -> bool,
+    ) -> u32 {
+        let one = |(i, ray)| u32::from(world.blocked(ray, |h| accept(i, h))) << i;
+        rays.iter().enumerate().map(one).sum()
+    }
 }
-impl Real for f32 {}
+
+impl Real for f32 {
+    fn blocked(
+        world: &World,
+        rays: &[accel::Ray<f32>],
+        accept: impl Fn(usize, &accel::Hit<f32>) -> bool,
+    ) -> u32 {
+        world.blocked_packet(rays, accept)
+    }
+}
+
 impl Real for f64 {}
 
 /// Triangles of one object.
@@ -70,6 +90,14 @@ pub(super) struct Hit {
     pub object: u32,
     pub triangle: u32,
     pub back: bool,
+}
+
+/// A ray to a lamp, which is at `far`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ToLamp {
+    pub origin: DVec3,
+    pub direction: DVec3,
+    pub far: f64,
 }
 
 /// A place on a surface.
@@ -297,38 +325,50 @@ impl<'a, R: Real> Stage<'a, R> {
         best
     }
 
-    /// The share of light that gets from a place to `t = 1` along a direction (or to the end of the world): what blends, and glass,
-    /// let theirs through, straight on.
-    pub fn passing(&self, origin: DVec3, direction: DVec3, far: f64, left: u32) -> DVec3 {
-        let ray = self.ray(origin, direction, 0.0, far);
-        let line = [origin, direction].map(R::kept);
-        let passed = Cell::new(DVec3::ONE);
-        let stops = |finish: &Finish, alpha: &dyn Fn() -> f64| {
-            if finish.is_glass() {
-                passed.set(passed.get() * finish.transmission);
-                return false;
-            }
-            match finish.alpha {
-                Alpha::Opaque => true,
-                Alpha::Mask(cut_off) => alpha() >= cut_off,
-                Alpha::Blend => {
-                    passed.set(passed.get() * (1.0 - alpha()));
-                    false
-                }
-            }
+    /// The shares of light that get along some rays, at most eight: what blends, and glass, let theirs through, straight on.
+    pub fn passing(&self, rays: &[ToLamp], left: u32) -> [DVec3; 8] {
+        let passed: [Cell<DVec3>; 8] = Default::default();
+        let stops = |i: usize, finish: &Finish, alpha: &dyn Fn() -> f64| {
+            let cell: &Cell<DVec3> = &passed[i];
+            let share = match finish.alpha {
+                _ if finish.is_glass() => finish.transmission,
+                Alpha::Opaque => return true,
+                Alpha::Mask(cut_off) => return alpha() >= cut_off,
+                Alpha::Blend => DVec3::splat(1.0 - alpha()),
+            };
+            cell.set(cell.get() * share);
+            false
         };
-        let blocked = self.world.blocked(&ray, |h| {
-            let body = &self.bodies[h.object as usize];
-            body.ahead(h.triangle, line)
-                && stops(&body.finish, &|| self.coat.alpha(self.isa, body, &(*h).into()))
-        });
-        let hidden = blocked
-            || self.solids.iter().enumerate().any(|(i, (geometry, finish))| {
-                let own = left as usize == self.bodies.len() + i;
-                let met = solid::meet(geometry, [origin, direction], own, [f64::MIN_POSITIVE, far]).is_some();
-                met && stops(finish, &|| self.coat.solid_alpha(finish.material))
+
+        // Shapes are the quickest to ask; what they leave goes through the triangles together.
+        let (mut open, mut n) = ([0; 8], 0);
+        for (i, ray) in rays.iter().enumerate() {
+            passed[i].set(DVec3::ONE);
+            let hidden = self.solids.iter().enumerate().any(|(k, (geometry, finish))| {
+                let own = left as usize == self.bodies.len() + k;
+                let range = [f64::MIN_POSITIVE, ray.far];
+                solid::meet(geometry, [ray.origin, ray.direction], own, range).is_some()
+                    && stops(i, finish, &|| self.coat.solid_alpha(finish.material))
             });
-        if hidden { DVec3::ZERO } else { passed.get() }
+            if hidden {
+                passed[i].set(DVec3::ZERO);
+            } else {
+                (open[n], n) = (i, n + 1);
+            }
+        }
+        if n > 0 && !self.bodies.is_empty() {
+            let made = open.map(|i| {
+                let r = &rays[i];
+                (self.ray(r.origin, r.direction, 0.0, r.far), [r.origin, r.direction].map(R::kept))
+            });
+            let blocked = R::blocked(self.world, &made.map(|m| m.0)[..n], |k, h| {
+                let body = &self.bodies[h.object as usize];
+                body.ahead(h.triangle, made[k].1)
+                    && stops(open[k], &body.finish, &|| self.coat.alpha(self.isa, body, &(*h).into()))
+            });
+            (0..n).filter(|k| blocked >> k & 1 == 1).for_each(|k| passed[open[k]].set(DVec3::ZERO));
+        }
+        passed.map(|p| p.get())
     }
 
     /// Where a path meets a surface.
@@ -370,6 +410,19 @@ impl Spot {
 impl Body<'_> {
     pub fn corners(&self, triangle: u32) -> [DVec3; 3] {
         self.triangles[triangle as usize].map(|v| self.positions[v as usize].as_dvec3())
+    }
+
+    /// How far a place lies below the smooth surface that the normals at its triangle's corners tell of, on the side of `normal`: no
+    /// ray to a lamp must start there, or facets would show in the shadow's edge (Hanika, "Hacking the Shadow Terminator", 2021).
+    pub fn lift(&self, triangle: u32, spot: &Spot, normal: DVec3) -> Option<DVec3> {
+        let object = self.object.filter(|o| !o.normals.is_empty())?;
+        let lift = |(v, b): (u32, f64)| {
+            let n = object.normals[v as usize].as_dvec3();
+            let n = if n.dot(normal) < 0.0 { -n } else { n };
+            let below = (spot.position - self.positions[v as usize].as_dvec3()).dot(n).min(0.0);
+            n * (-below * b)
+        };
+        Some(self.triangles[triangle as usize].into_iter().zip(spot.b).map(lift).sum())
     }
 
     /// Whether a ray that starts at a surface truly has a triangle before it: a plane that runs through the start, or lies behind it,

@@ -3,7 +3,7 @@
 use super::coat::{Alpha, Batch, Dressed};
 use super::optics;
 use super::sampler;
-use super::stage::{Finish, Hit, Real, Spot, Stage};
+use super::stage::{Finish, Hit, Real, Spot, Stage, ToLamp};
 use super::{RayCount, RaySettings};
 use crate::render::shade::LampKind;
 use glam::{DVec3, Vec3};
@@ -35,6 +35,7 @@ pub(super) struct Wave {
     next: Vec<Path>,
     hits: Vec<(Hit, u32)>,
     reached: Vec<[DVec3; 8]>,
+    sent: Vec<(usize, ToLamp)>,
     pub count: RayCount,
     /// Light and alpha, a pixel of the tile each.
     pub sums: Vec<[f64; 4]>,
@@ -108,14 +109,16 @@ impl Wave {
         // How much of each lamp arrives?
         self.reached.clear();
         if here.settings.shadows && dressed.takes_light() {
-            let count = &mut self.count;
-            self.reached.extend((0..stage.lamps.len()).map(|lamp| {
-                let share = |k: usize, count: &mut RayCount| match k < run.len() {
-                    true => arriving(stage, here, &batch, &dressed, lamp, k, count),
-                    false => DVec3::ONE,
-                };
-                std::array::from_fn(|k| share(k, count))
-            }));
+            for lamp in 0..stage.lamps.len() {
+                self.sent.clear();
+                let rays = (0..run.len()).map(|k| (k, to_lamp(stage, here, &batch, &dressed, lamp, k)));
+                self.sent.extend(rays.filter_map(|(k, ray)| Some((k, ray?))));
+                self.count.shadow += self.sent.len() as u64;
+                let rays: Vec<ToLamp> = self.sent.iter().map(|s| s.1).collect();
+                let (shares, mut reached) = (stage.passing(&rays, object), [DVec3::ZERO; 8]);
+                self.sent.iter().zip(shares).for_each(|((k, _), share)| reached[*k] = share);
+                self.reached.push(reached);
+            }
         }
         let colors = stage.coat.light(stage.isa, &dressed, &stage.lamps, &self.reached);
 
@@ -235,16 +238,15 @@ fn carried(path: &Path, t: f64, face: DVec3) -> [Vec3; 4] {
     [run(ox, dx), run(oy, dy), turn(dx), turn(dy)]
 }
 
-/// The share of a lamp's light that arrives at one hit.
-fn arriving<R: Real>(
+/// The ray from a hit to a lamp; none where the surface is turned away: it gets nothing, whatever lies between.
+fn to_lamp<R: Real>(
     stage: &Stage<R>,
     here: Here,
     batch: &Batch,
     dressed: &Dressed<R>,
     lamp: usize,
     k: usize,
-    count: &mut RayCount,
-) -> DVec3 {
+) -> Option<ToLamp> {
     let (path, hit, spot) = (&batch.paths[k], &batch.hits[k], &batch.spots[k]);
     let light = &stage.lamps[lamp];
     // Where in the lamp: its middle, unless it has a size and there is more than one sample.
@@ -261,21 +263,23 @@ fn arriving<R: Real>(
         let x = axis.any_orthonormal_vector();
         (x * a + axis.cross(x) * b) * radius
     };
-    let (point, far) = match light.kind {
+    let (towards, far) = match light.kind {
         LampKind::Directional { towards } => (towards.wide(), f64::INFINITY),
         LampKind::Point { position, .. } | LampKind::Spot { position, .. } => {
             (position.wide() - spot.position, 1.0)
         }
     };
-    let direction = point + aside(point.normalize_or(DVec3::Y));
-    // What is turned away gets nothing, whatever lies between.
-    if stage.coat.gated() && dressed.normal(k).dot(point) <= 0.0 {
-        return DVec3::ZERO;
+    let normal = dressed.normal(k);
+    if stage.coat.gated() && normal.dot(towards) <= 0.0 {
+        return None;
     }
-    count.shadow += 1;
-    let origin = spot.leave(direction);
-    let direction = if far < f64::INFINITY { direction + (spot.position - origin) } else { direction };
-    stage.passing(origin, direction, far, hit.object)
+    let towards = towards + aside(towards.normalize_or(DVec3::Y));
+    let origin = match batch.body.and_then(|b| b.lift(hit.triangle, spot, normal)) {
+        Some(lift) => spot.leave(normal) + lift,
+        None => spot.leave(towards),
+    };
+    let direction = if far < f64::INFINITY { towards + (spot.position - origin) } else { towards };
+    Some(ToLamp { origin, direction, far })
 }
 
 /// From the unit square onto the unit disc, areas kept (Shirley and Chiu 1997).
