@@ -199,6 +199,33 @@ impl Character {
         Ok(self)
     }
 
+    /// The bones that move a vertex of an instance.
+    ///
+    /// # Panics
+    /// If there is no such instance or vertex.
+    pub fn bones_of(&self, instance: usize, vertex: usize) -> impl Iterator<Item = BoneId> + '_ {
+        let (one, many) = match &self.instances[instance].binding {
+            Binding::Bone(b) => (Some(*b), None),
+            Binding::Skin { palette, weights } => (None, Some((palette, weights))),
+        };
+        let skinned =
+            many.into_iter().flat_map(move |(p, w)| w.of(vertex).map(|(b, weight)| (p[b].0, weight)));
+        one.into_iter().chain(skinned.filter(|s| s.1 > 0.0).map(|s| s.0))
+    }
+
+    /// For each morph weight, how far it moves a vertex at most, metres in the mesh's frame.
+    pub fn target_reach(&self) -> Vec<f64> {
+        let mut reach = vec![0.0_f64; self.rest_weights.len()];
+        for i in &self.instances {
+            for (k, target) in self.mesh(i).targets.iter().enumerate() {
+                let far = target.positions.iter().map(|d| d.length() as f64).fold(0.0, f64::max);
+                let r = &mut reach[i.first_weight + k];
+                *r = r.max(far);
+            }
+        }
+        reach
+    }
+
     /// The pose that no clip touches.
     pub fn rest_pose(&self) -> Pose {
         Pose { weights: self.rest_weights.clone(), ..Pose::rest(&self.skeleton) }

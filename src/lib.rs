@@ -124,6 +124,8 @@ pub mod frames;
 
 pub mod measure;
 
+pub mod bake;
+
 #[cfg(feature = "pictures")]
 pub mod sheet;
 

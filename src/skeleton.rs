@@ -185,7 +185,7 @@ impl Skeleton {
     }
 
     /// All bones, parents first.
-    pub fn ids(&self) -> impl ExactSizeIterator<Item = BoneId> + use<> {
+    pub fn ids(&self) -> impl ExactSizeIterator<Item = BoneId> + DoubleEndedIterator + use<> {
         (0..self.bones.len() as u32).map(BoneId)
     }
 

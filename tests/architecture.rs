@@ -43,6 +43,8 @@ const ROOMS: &[(&str, &[&str])] = &[
         ],
     ),
     ("measure", &["image"]),
+    // Curves to curves, measured on the skin: never a file, never a picture.
+    ("bake", &["math", "time", "skeleton", "pose", "clip", "fk", "character"]),
     // Frames side by side, wherever they came from: it cuts and copies, and never draws.
     ("sheet", &["time", "image"]),
     // Formats: data rooms only, never frames or render.

@@ -1,6 +1,8 @@
 //! What the library promises, a module a subject.
 
 mod architecture;
+#[cfg(feature = "io")]
+mod bake;
 #[cfg(feature = "cli")]
 mod batch;
 mod channels;

@@ -1,5 +1,6 @@
 //! The command line: parse, call the library, print, choose an exit code. No algorithm lives here.
 
+mod bake;
 mod compare;
 mod eval;
 mod info;
@@ -41,6 +42,8 @@ struct Cli {
 enum Command {
     /// Draw a character: one picture, a numbered sequence or a film.
     Render(Box<render::Args>),
+    /// Make a file's clips small within an error that you choose.
+    Bake(bake::Args),
     /// Tell what is in a file: bones, meshes, clips, extensions, warnings.
     Info(info::Args),
     /// Print node matrices and vertex positions as JSON.
@@ -110,6 +113,7 @@ pub fn run() -> ExitCode {
     let say = Say::new(cli.quiet, cli.verbose);
     let done = match cli.command {
         Command::Render(args) => render::run(&args, &say),
+        Command::Bake(args) => bake::run(&args, &say),
         Command::Info(args) => info::run(&args, &say),
         Command::Eval(args) => eval::run(&args, &say),
         Command::Compare(args) => compare::run(&args, &say),

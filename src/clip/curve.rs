@@ -2,7 +2,7 @@
 
 use super::quat;
 use crate::math::rotation;
-use crate::math::spline::{Tangents, hermite, tangent};
+use crate::math::spline::{Tangents, hermite, hermite_slope, tangent};
 use crate::time::Range;
 use glam::Quat;
 
@@ -162,6 +162,41 @@ impl Curve {
                 self.between(k, u, &mut v);
                 rotation::unit(quat(&v))
             }
+        }
+    }
+
+    /// The same curve with stored slopes where a rule gave them: [`Interpolation::CatmullRom`] becomes [`Interpolation::Hermite`].
+    pub fn with_slopes(&self) -> Self {
+        let Interpolation::CatmullRom(rule) = self.interpolation else { return self.clone() };
+        let mut values = Vec::with_capacity(3 * self.values.len());
+        for k in 0..self.times.len() {
+            let slopes: Vec<f32> = (0..self.width).map(|c| self.slope(rule, k, c) as f32).collect();
+            values.extend(&slopes);
+            values.extend(self.value(k));
+            values.extend(&slopes);
+        }
+        Self { times: self.times.clone(), values, width: self.width, interpolation: Interpolation::Hermite }
+    }
+
+    /// Change a second of each component of an [`Interpolation::Hermite`] curve at `t`; zero outside its keys.
+    pub(crate) fn slope_at(&self, t: f64) -> Vec<f32> {
+        let w = self.width;
+        match self.locate(t) {
+            Place::Between(k, u) => (0..w)
+                .map(|c| {
+                    let h = self.times[k + 1] - self.times[k];
+                    let (p, q) = (self.value(k)[c] as f64, self.value(k + 1)[c] as f64);
+                    let out_slope = self.values[3 * w * k + 2 * w + c] as f64;
+                    let in_slope = self.values[3 * w * (k + 1) + c] as f64;
+                    hermite_slope(p, out_slope, q, in_slope, h, u) as f32
+                })
+                .collect(),
+            // Within the keys the slope on the way out is the one that a cut is followed by.
+            Place::Key(k) if t <= self.times[k] && k + 1 < self.times.len() => {
+                self.values[3 * w * k + 2 * w..3 * w * (k + 1)].to_vec()
+            }
+            Place::Key(k) if t == self.times[k] => self.values[3 * w * k..3 * w * k + w].to_vec(),
+            Place::Key(_) => vec![0.0; w],
         }
     }
 

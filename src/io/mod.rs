@@ -1,6 +1,8 @@
 //! Formats: bytes to assets and back. One file or folder a format; the core never knows where a rig came from.
 
 #[cfg(feature = "io")]
+pub mod bvh;
+#[cfg(feature = "io")]
 pub mod gltf;
 #[cfg(feature = "io")]
 mod json_color;
@@ -71,7 +73,7 @@ pub struct PrimitiveSource {
 pub struct Import {
     /// What moves and how it looks.
     pub asset: Asset,
-    /// `glTF`, `sinew rig`, `notes rig`, `notes scene`, or `sinew scene of a …`.
+    /// `glTF`, `sinew rig`, `notes rig`, `BVH`, `notes scene`, or `sinew scene of a …`.
     pub format: String,
     /// What the file says made it.
     pub generator: String,
@@ -104,6 +106,9 @@ pub enum ImportError {
     /// A rig of ours.
     #[error(transparent)]
     Rig(#[from] rig_json::RigError),
+    /// A motion capture.
+    #[error(transparent)]
+    Bvh(#[from] bvh::BvhError),
     /// A rig of the notes.
     #[error(transparent)]
     Notes(#[from] notes::NotesError),
@@ -128,6 +133,10 @@ fn read_import(path: &std::path::Path, options: &Options, scenes: bool) -> Resul
     let folder = path.parent().unwrap_or(std::path::Path::new(""));
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     match probe(&bytes, &name) {
+        Format::Bvh => {
+            let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+            Ok(bvh::import_bytes(&bytes, &stem)?)
+        }
         Format::Notes => Ok(notes::import_bytes(&bytes, folder, options)?),
         Format::Gltf => {
             let folder = if folder.as_os_str().is_empty() { std::path::Path::new(".") } else { folder };
@@ -183,6 +192,7 @@ fn read_below(root: &std::path::Path, path: &std::path::Path) -> std::io::Result
 #[cfg(feature = "io")]
 enum Format {
     Gltf,
+    Bvh,
     Rig,
     Notes,
     NotesScene,
@@ -211,6 +221,10 @@ fn probe(bytes: &[u8], name: &str) -> Format {
         return Format::Gltf;
     }
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let start = text.trim_ascii_start();
+    if start.get(..9).is_some_and(|w| w.eq_ignore_ascii_case(b"HIERARCHY")) {
+        return Format::Bvh;
+    }
     match serde_json::from_slice::<Keys>(text) {
         Ok(Keys { sinew_rig: Some(_), .. }) => Format::Rig,
         Ok(Keys { asset: Some(_), .. }) => Format::Gltf,
@@ -230,7 +244,7 @@ fn probe(bytes: &[u8], name: &str) -> Format {
         }
         Err(_) if bytes.is_empty() => Format::Unknown("the file is empty".into()),
         Err(_) => Format::Unknown(format!(
-            "expected glTF (.gltf, .glb) or a rig (.json), found bytes that begin with {:02x?}",
+            "expected glTF (.gltf, .glb), a rig (.json) or a capture (.bvh), found bytes that begin with {:02x?}",
             &bytes[..bytes.len().min(8)]
         )),
     }

@@ -24,6 +24,11 @@ pub fn hermite(p0: f64, m0: f64, p1: f64, m1: f64, h: f64, u: f64) -> f64 {
         + (u3 - u2) * h * m1
 }
 
+/// The derivative of [`hermite`] by time.
+pub fn hermite_slope(p0: f64, m0: f64, p1: f64, m1: f64, h: f64, u: f64) -> f64 {
+    6.0 * (u * u - u) * (p0 - p1) / h + (3.0 * u * u - 4.0 * u + 1.0) * m0 + (3.0 * u * u - 2.0 * u) * m1
+}
+
 /// The slope at a key from its neighbours, one-sided where one is missing (`None`).
 ///
 /// Arguments are `(time, value)` of the previous, this and the next key; times strictly increase.

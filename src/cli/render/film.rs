@@ -5,7 +5,7 @@ use super::renderer;
 use super::sheet::Painter;
 use super::time::Frame;
 use crate::cli::{Failure, say::Say};
-use sinew::frames::{FrameStats, Moment, Shot, Stop, Worker, in_order_pairs};
+use sinew::frames::{FrameStats, Moment, Shot, Stop, Worker, in_order, in_order_pairs};
 use sinew::image::{Image, Rgba8};
 use sinew::io::manifest::sha256;
 use sinew::io::picture::{
@@ -166,44 +166,45 @@ fn refuse_existing(job: &Job) -> Result<(), Failure> {
 }
 
 /// Draws one moment.
-type Shoot<P> = fn(&Job, Moment, &mut Worker) -> (P, FrameStats);
+type Shoot<P> = fn(&Job, Moment, &mut Worker, &mut P) -> FrameStats;
 
 /// As it is shown: painted, where there is pixel art.
-fn shoot(job: &Job, moment: Moment, worker: &mut Worker) -> (Rgba8, FrameStats) {
-    let mut out = Rgba8::default();
+fn shoot(job: &Job, moment: Moment, worker: &mut Worker, out: &mut Rgba8) -> FrameStats {
     job.follow(worker);
-    let stats = job.shot.draw(moment, worker, &mut out);
-    match &job.art {
-        Some(art) => (art.paint(&out), stats),
-        None => (out, stats),
+    let stats = job.shot.draw(moment, worker, out);
+    if let Some(art) = &job.art {
+        *out = art.paint(out);
     }
+    stats
 }
 
-fn shoot_linear(job: &Job, moment: Moment, worker: &mut Worker) -> (Image, FrameStats) {
-    let mut out = Image::default();
+fn shoot_linear(job: &Job, moment: Moment, worker: &mut Worker, out: &mut Image) -> FrameStats {
     job.follow(worker);
-    let stats = job.shot.draw_linear(moment, worker, &mut out);
-    (out, stats)
+    job.shot.draw_linear(moment, worker, out)
 }
 
 /// Draw moments in parallel, encode each beside the one before on a worker, and hand the results on in order.
-fn draw<P: Send + Sync, S, T: Send>(
+fn draw<S, T: Send>(
     job: &Job,
     frames: &[Frame],
-    shoot: impl Fn(&Job, Moment, &mut Worker) -> (P, FrameStats) + Sync,
     state: impl Fn() -> S + Sync,
-    encode: impl Fn(&mut S, Option<&P>, &P) -> T + Sync,
+    encode: impl Fn(&mut S, Option<&Rgba8>, &Rgba8) -> T + Sync,
     mut receive: impl FnMut(&mut Written, usize, T) -> Result<(), picture::Error>,
 ) -> Result<Written, Fault> {
     let mut fault = None;
     let mut written = Written::default();
     let start = || (Worker::default(), state());
-    let first = |(worker, _): &mut (Worker, S), i: usize| shoot(job, frames[i].moment, worker);
-    let second = |(_, s): &mut (Worker, S), before: Option<&(P, FrameStats)>, now: &(P, FrameStats)| {
-        let start = Instant::now();
-        let encoded = encode(s, before.map(|b| &b.0), &now.0);
-        (encoded, now.1, start.elapsed())
+    let first = |(worker, _): &mut (Worker, S), i: usize| {
+        let mut picture = Rgba8::default();
+        let stats = shoot(job, frames[i].moment, worker, &mut picture);
+        (picture, stats)
     };
+    let second =
+        |(_, s): &mut (Worker, S), before: Option<&(Rgba8, FrameStats)>, now: &(Rgba8, FrameStats)| {
+            let start = Instant::now();
+            let encoded = encode(s, before.map(|b| &b.0), &now.0);
+            (encoded, now.1, start.elapsed())
+        };
     let done =
         in_order_pairs(frames.len(), job.threads, start, first, second, |i, (result, stats, encode)| {
             let start = Instant::now();
@@ -216,6 +217,75 @@ fn draw<P: Send + Sync, S, T: Send>(
                 Stop
             })
         });
+    ended(done, fault, written)
+}
+
+/// What became of a still.
+#[derive(Default)]
+struct Still {
+    stats: FrameStats,
+    hash: Option<String>,
+    /// As it left the encoder; kept only for a pipe, which takes frames in order.
+    bytes: Vec<u8>,
+    size: usize,
+    encode: Duration,
+    write: Duration,
+}
+
+/// A picture a frame, each into a file of its own or one after the other to standard output.
+///
+/// Workers write the files, each as soon as it is encoded, and draw into one picture again and again: new memory for every
+/// picture costs more than encoding it.
+fn stills<P: Default>(
+    job: &Job,
+    say: &Say,
+    shoot: Shoot<P>,
+    encode: impl Fn(&P, &Channels) -> Result<Vec<u8>, picture::Error> + Sync,
+) -> Result<Written, Fault> {
+    let wanted = job.beside.wanted();
+    let folder = if matches!(job.target, Target::Sequence(..)) { Folder::Create } else { Folder::MustExist };
+    let bar = say.progress(job.frames.len());
+    let still = |(worker, picture, seen): &mut (Worker, P, Channels), i: usize| {
+        let mut stats = shoot(job, job.frames[i].moment, worker, picture);
+        if !wanted.is_empty() {
+            stats += job.shot.draw_channels(job.frames[i].moment, worker, &wanted, seen);
+        }
+        let start = Instant::now();
+        let bytes = encode(picture, seen)?;
+        let beside = job.beside.encode_all(job.target.format(), seen)?;
+        let hash = job.hash.then(|| sha256(&bytes));
+        let size = bytes.len() + beside.iter().map(|b| b.1.len()).sum::<usize>();
+        let mut still = Still { stats, hash, size, encode: start.elapsed(), ..Still::default() };
+        let start = Instant::now();
+        match job.target.path_of(job.frames[i].number) {
+            Some(path) => {
+                for (name, bytes) in &beside {
+                    AtomicFile::write(name.file(&path), bytes, job.force, folder)?;
+                }
+                AtomicFile::write(path, &bytes, job.force, folder)?;
+            }
+            None => still.bytes = bytes,
+        }
+        still.write = start.elapsed();
+        Ok(still)
+    };
+    let (mut written, mut fault) = (Written::default(), None);
+    let state = || (Worker::default(), P::default(), Channels::default());
+    let done =
+        in_order(job.frames.len(), job.threads, state, still, |_, result: Result<Still, picture::Error>| {
+            let received = result.and_then(|s| written.add(s));
+            bar.inc(1);
+            received.map_err(|e| {
+                fault = Some(e);
+                Stop
+            })
+        });
+    bar.finish_and_clear();
+    ended(done, fault, written)
+}
+
+/// What a run of workers came to.
+fn ended(done: Result<(), Stop>, fault: Option<picture::Error>, written: Written) -> Result<Written, Fault> {
     match (done, fault) {
         (Ok(()), _) => Ok(written),
         (_, Some(e)) => Err(Fault::Write(e)),
@@ -223,58 +293,22 @@ fn draw<P: Send + Sync, S, T: Send>(
     }
 }
 
-/// A picture a frame, each into a file of its own or one after the other to standard output.
-fn stills<P: Send + Sync>(
-    job: &Job,
-    say: &Say,
-    shoot: Shoot<P>,
-    encode: impl Fn(&P, &Channels) -> Result<Vec<u8>, picture::Error> + Sync,
-) -> Result<Written, Fault> {
-    let wanted = job.beside.wanted();
-    let both = |job: &Job, moment: Moment, worker: &mut Worker| {
-        let (picture, mut stats) = shoot(job, moment, worker);
-        let mut seen = Channels::default();
-        if !wanted.is_empty() {
-            stats += job.shot.draw_channels(moment, worker, &wanted, &mut seen);
+impl Written {
+    /// Count a still, and send it to the pipe if it waits for that.
+    fn add(&mut self, still: Still) -> Result<(), picture::Error> {
+        let start = Instant::now();
+        if !still.bytes.is_empty() {
+            let mut out = Output::stdout(false);
+            out.write_all(&still.bytes).map_err(|source| picture::Error::Stdout { source })?;
+            out.commit()?;
         }
-        ((picture, seen), stats)
-    };
-    let folder = if matches!(job.target, Target::Sequence(..)) { Folder::Create } else { Folder::MustExist };
-    let bar = say.progress(job.frames.len());
-    let encode = |(): &mut (), _: Option<&(P, Channels)>, (picture, seen): &(P, Channels)| {
-        let bytes = encode(picture, seen)?;
-        Ok((job.hash.then(|| sha256(&bytes)), bytes, job.beside.encode_all(job.target.format(), seen)?))
-    };
-    let written = draw(
-        job,
-        job.frames,
-        both,
-        || (),
-        encode,
-        |written, i, result: Result<_, picture::Error>| {
-            let (hash, bytes, beside) = result?;
-            written.hashes.extend(hash);
-            written.bytes += bytes.len() as u64;
-            match job.target.path_of(job.frames[i].number) {
-                Some(path) => {
-                    for (name, bytes) in &beside {
-                        written.bytes += bytes.len() as u64;
-                        AtomicFile::write(name.file(&path), bytes, job.force, folder)?;
-                    }
-                    AtomicFile::write(path, &bytes, job.force, folder)?
-                }
-                None => {
-                    let mut out = Output::stdout(false);
-                    out.write_all(&bytes).map_err(|source| picture::Error::Stdout { source })?;
-                    out.commit()?;
-                }
-            }
-            bar.inc(1);
-            Ok(())
-        },
-    );
-    bar.finish_and_clear();
-    written
+        self.hashes.extend(still.hash);
+        self.drawn += still.stats;
+        self.bytes += still.size as u64;
+        self.encode += still.encode;
+        self.write += still.write + start.elapsed();
+        Ok(())
+    }
 }
 
 /// All frames into one file.
@@ -303,7 +337,7 @@ fn write_film(job: &Job, say: &Say) -> Result<Written, Fault> {
         encoder.encode(before, now).map(|frame| (hash, frame))
     };
     let state = || FrameEncoder::new(film, &coding);
-    let mut written = draw(job, job.frames, shoot, state, encode, |written, _, result| {
+    let mut written = draw(job, job.frames, state, encode, |written, _, result| {
         let (hash, frame) = result?;
         written.hashes.extend(hash);
         bar.inc(1);
@@ -332,7 +366,6 @@ fn gif_coding(job: &Job, film: &Film, say: &Say) -> Result<Coding, Fault> {
     draw(
         job,
         &spread,
-        shoot,
         || (),
         keep,
         |_, _, picture| {

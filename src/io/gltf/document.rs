@@ -59,6 +59,11 @@ impl<'a> Document<'a> {
         Ok(Self { root, blobs, blob_of, unpacked, used: Cell::new(0), limit })
     }
 
+    /// All bytes of a buffer, if it has any.
+    pub fn raw(&self, buffer: usize) -> Option<&[u8]> {
+        self.blob_of.get(buffer).copied().flatten().map(|k| &self.blobs[k][..])
+    }
+
     /// Count `bytes` of decoded data against what a file of this size may ask for.
     pub fn charge(&self, bytes: u64, place: &str) -> Result<()> {
         let asked = self.used.get().saturating_add(bytes);

@@ -19,6 +19,7 @@ mod mend;
 mod mounts;
 mod nodes;
 mod pictures;
+mod rewrite;
 mod skins;
 mod surface;
 mod textures;
@@ -27,6 +28,7 @@ mod uri;
 mod warnings;
 
 pub use error::GltfError;
+pub use rewrite::{NewClip, Rewritten, with_clips};
 
 use super::{Import, Options};
 use crate::asset::Asset;

@@ -14,16 +14,22 @@
 //! assert!(!world.blocked(&Ray { t_max: 1.5, ..ray }, |_| true));
 //! ```
 
+mod bounds;
 mod build;
+mod crossing;
 mod lanes;
+mod overlap;
 mod packet;
+mod point;
 mod ray;
 mod search;
 mod tree;
 mod triangle;
 mod world;
 
+pub use bounds::{OrientedBox, Sphere};
 pub use packet::PACKET;
+pub use point::Closest;
 pub use ray::{Hit, Ray, Real};
 pub use world::{Motion, Placed, Surface, Updated, World};
 
@@ -31,6 +37,7 @@ use crate::math::simd::Isa;
 use build::{Item, Span};
 use glam::Vec3;
 use lanes::{Lanes, Machine, Work};
+use overlap::{Grid, Octree};
 use ray::Slab;
 use search::{Any, Nearest, Packs, Search};
 use tree::{Node, Visitor};
@@ -42,6 +49,10 @@ pub enum Kind {
     /// Eight boxes to a node, four triangles to a leaf, split where the surface-area heuristic is lowest. The fastest.
     #[default]
     Tree,
+    /// Cells cut in eight while that separates triangles.
+    Octree,
+    /// Equal cells.
+    Grid,
     /// Every triangle is looked at.
     Brute,
 }
@@ -62,6 +73,7 @@ pub struct Accel {
     packs: Vec<Pack>,
     vertices: Vec<Vertices>,
     nodes: Vec<Node>,
+    grid: Grid,
     /// Where the parts below the root end in `nodes` and `packs`.
     cuts: Vec<[usize; 2]>,
     /// Surface-area cost as built.
@@ -83,6 +95,7 @@ impl Accel {
             packs: Vec::new(),
             vertices: Vec::new(),
             nodes: Vec::new(),
+            grid: Grid::default(),
             cuts: Vec::new(),
             built: 0.0,
         };
@@ -118,11 +131,25 @@ impl Accel {
         let mut items: Vec<Item> = triangles.iter().enumerate().map(item).collect();
         self.span = Span::EMPTY;
         items.iter().for_each(|i| self.span.join(i.span()));
+        let wide = || -> Vec<overlap::Corners> {
+            triangles.iter().map(|t| t.each_ref().map(|i| corner(i).as_dvec3())).collect()
+        };
         let leaves = match self.kind {
             Kind::Tree => {
                 let grown = build::grow(&mut items, build::LEAF_SIZE, threads);
                 (self.nodes, self.cuts) = (grown.nodes, grown.cuts);
                 grown.leaves
+            }
+            Kind::Octree => {
+                let wide = wide();
+                let tree = Octree::new(&wide, &self.span);
+                self.nodes = tree.nodes;
+                tree.leaves
+            }
+            Kind::Grid => {
+                let (grid, leaves) = Grid::new(&wide(), &self.span);
+                self.grid = grid;
+                leaves
             }
             Kind::Brute => {
                 let ids: Vec<u32> = (0..self.triangles as u32).collect();
@@ -154,8 +181,12 @@ impl Accel {
     /// # Panics
     /// If there are fewer positions than triangles name.
     pub fn update(&mut self, positions: &[Vec3], threads: usize) -> bool {
-        self.refit(positions, threads);
-        let rebuild = self.cost() > DECAY * self.built;
+        // Cells do not move with triangles.
+        let cells = matches!(self.kind, Kind::Octree | Kind::Grid);
+        if !cells {
+            self.refit(positions, threads);
+        }
+        let rebuild = cells || self.cost() > DECAY * self.built;
         if rebuild {
             let triangles = self.list();
             self.build(positions, &triangles, threads);
@@ -219,7 +250,8 @@ impl Accel {
         slab.t_max = slab.t_max.min(t_max);
         let mut packs = Packs { packs: &self.packs, ray, shear: None, object, search };
         match self.kind {
-            Kind::Tree => tree::walk::<S>(&self.nodes, 0, &slab, &mut packs),
+            Kind::Tree | Kind::Octree => tree::walk::<S>(&self.nodes, 0, &slab, &mut packs),
+            Kind::Grid => self.grid.walk(ray, &slab, &self.span, |at, t| packs.leaf::<S>(at, t)),
             Kind::Brute => {
                 (0..self.packs.len()).fold(slab.t_max, |t, at| packs.leaf::<S>(at as u32, t));
             }

@@ -35,7 +35,7 @@ pub struct Hit<R> {
     pub object: u32,
     /// Which triangle of it.
     pub triangle: u32,
-    /// The ray meets its back: the corners go round clockwise as seen from the origin.
+    /// The ray meets its back: where it stands in its surface, corners go round clockwise as seen from the origin.
     pub back: bool,
 }
 

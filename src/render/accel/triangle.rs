@@ -59,7 +59,7 @@ impl<R: Real> Shear<R> {
 
     /// What one triangle has to say, edges and corners included; nothing in its own plane.
     #[inline(always)]
-    fn meet(&self, corners: [[f32; 3]; 3]) -> Option<Meeting<R>> {
+    pub fn meet(&self, corners: [[f32; 3]; 3]) -> Option<Meeting<R>> {
         let (a, b, c) = (self.apply(corners[0]), self.apply(corners[1]), self.apply(corners[2]));
         // Surely missed?
         let signs = |p: R, q: R| ((p > q) as u32) | ((p < q) as u32) << 1;
@@ -83,7 +83,7 @@ impl<R: Real> Shear<R> {
 }
 
 /// `t`, two edge functions and the sum of all three.
-struct Meeting<R> {
+pub struct Meeting<R> {
     t: R,
     v: f64,
     w: f64,

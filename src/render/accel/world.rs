@@ -28,7 +28,7 @@ pub struct Placed {
     pub world_from_surface: Option<DAffine3>,
     /// Rays pass through its back.
     pub cull_back: bool,
-    /// Its triangles wind the other way round, apart from what a mirroring placement does.
+    /// Its triangles wind the other way round: clockwise in front. What a placement mirrors keeps its front without this.
     pub mirrored: bool,
 }
 
@@ -65,8 +65,6 @@ pub(super) struct Object {
     pub placed: Placed,
     /// Inverse of the placement, if that has one.
     pub surface_from_world: Option<DAffine3>,
-    /// Backs are fronts.
-    flipped: bool,
 }
 
 /// All objects that a ray can meet.
@@ -235,7 +233,7 @@ pub(super) struct Own<'a, Q> {
 impl<R: Real, Q: Search<R>> Search<R> for Own<'_, Q> {
     #[inline(always)]
     fn found(&mut self, hit: Hit<R>) {
-        let back = hit.back != self.object.flipped;
+        let back = hit.back != self.object.placed.mirrored;
         if !(back && self.object.placed.cull_back) {
             self.search.found(Hit { back, ..hit });
         }
@@ -250,10 +248,9 @@ impl<R: Real, Q: Search<R>> Search<R> for Own<'_, Q> {
 impl Object {
     fn new(placed: Placed) -> Self {
         let m = placed.world_from_surface;
-        let det = m.map_or(1.0, |m| m.matrix3.determinant());
         // A flattened surface has no inside that a ray could be carried into.
         let inverse = m.map(|m| m.inverse()).filter(|i| i.is_finite());
-        Self { placed, surface_from_world: inverse, flipped: (det < 0.0) != placed.mirrored }
+        Self { placed, surface_from_world: inverse }
     }
 
     /// The box in the world, with room for the rounding of rays that are carried into the surface's frame.

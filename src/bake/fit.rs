@@ -1,0 +1,305 @@
+//! One track: the fewest keys that keep every sample of it within a tolerance.
+
+use crate::clip::{Curve, Interpolation};
+use crate::math::rotation;
+use glam::{DVec3, Quat, Vec3};
+
+/// How values of a track are compared, and what of them is stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Unit quaternions: radians between them.
+    Rotation,
+    /// Vectors: their distance.
+    Vector,
+    /// Morph weights: the largest difference.
+    Weights,
+}
+
+/// The source of a track, sampled where it may bend.
+pub(super) struct Samples {
+    pub kind: Kind,
+    pub width: usize,
+    /// Seconds, ascending. Two equal times are a jump: the value before it and the one after.
+    pub times: Vec<f64>,
+    /// `width` numbers a time.
+    pub values: Vec<f32>,
+    /// The samples that were keys of the curve.
+    pub own: Vec<usize>,
+}
+
+/// Between two keys of a cubic, so many samples; more where the keys are far apart in time.
+const CUBIC_STEPS: usize = 8;
+
+impl Samples {
+    /// Of a curve: its keys, and points between them.
+    pub fn of(curve: &Curve, kind: Kind) -> Self {
+        let keys = curve.times();
+        let mut out = Self { kind, width: curve.width(), times: vec![], values: vec![], own: vec![] };
+        for (k, &t) in keys.iter().enumerate() {
+            if k > 0 && keys[k - 1] == t {
+                continue;
+            }
+            if k > 0 {
+                out.between(curve, keys[k - 1], t);
+            }
+            out.own.push(out.times.len());
+            out.push(curve, t);
+        }
+        out.align();
+        out
+    }
+
+    fn between(&mut self, curve: &Curve, from: f64, to: f64) {
+        match curve.interpolation() {
+            // The value that is held, up to the jump.
+            Interpolation::Hold => {
+                let held = self.values[self.values.len() - self.width..].to_vec();
+                self.times.push(to);
+                self.values.extend(held);
+            }
+            Interpolation::Linear => self.push(curve, 0.5 * (from + to)),
+            Interpolation::CatmullRom(_) | Interpolation::Hermite => {
+                (1..CUBIC_STEPS)
+                    .for_each(|i| self.push(curve, from + (to - from) * i as f64 / CUBIC_STEPS as f64));
+            }
+        }
+    }
+
+    fn push(&mut self, curve: &Curve, t: f64) {
+        let from = self.values.len();
+        self.times.push(t);
+        self.values.resize(from + self.width, 0.0);
+        if self.kind == Kind::Rotation {
+            self.values[from..].copy_from_slice(&curve.sample_rotation(t).to_array());
+        } else {
+            curve.sample(t, &mut self.values[from..]);
+        }
+    }
+
+    /// Neighbouring quaternions on the same half of the sphere.
+    fn align(&mut self) {
+        if self.kind == Kind::Rotation {
+            for i in 1..self.times.len() {
+                if self.quat(i).dot(self.quat(i - 1)) < 0.0 {
+                    self.values[4 * i..4 * i + 4].iter_mut().for_each(|v| *v = -*v);
+                }
+            }
+        }
+    }
+
+    pub fn len(&self) -> usize {
+        self.times.len()
+    }
+
+    pub fn value(&self, i: usize) -> &[f32] {
+        &self.values[i * self.width..(i + 1) * self.width]
+    }
+
+    fn quat(&self, i: usize) -> Quat {
+        Quat::from_slice(self.value(i))
+    }
+
+    /// How far two values are apart: radians, or the unit of the values.
+    pub fn distance(&self, a: &[f32], b: &[f32]) -> f64 {
+        match self.kind {
+            Kind::Rotation => rotation::angle_between(Quat::from_slice(a), Quat::from_slice(b)) as f64,
+            Kind::Vector => wide(a).distance(wide(b)),
+            Kind::Weights => a.iter().zip(b).map(|(a, b)| (a - b).abs() as f64).fold(0.0, f64::max),
+        }
+    }
+
+    /// Whether a jump lies between sample `i` and the next.
+    pub fn jumps(&self, i: usize) -> bool {
+        i + 1 < self.len() && self.times[i] == self.times[i + 1]
+    }
+
+    /// Whether all of it lies within `tolerance` of a value.
+    pub fn is_constant(&self, value: &[f32], tolerance: f64) -> bool {
+        (0..self.len()).all(|i| self.distance(self.value(i), value) <= tolerance)
+    }
+}
+
+fn wide(v: &[f32]) -> DVec3 {
+    Vec3::from_slice(v).as_dvec3()
+}
+
+/// Keys of straight pieces: of samples, with the values that are stored for them.
+pub(super) struct Pieces {
+    /// Samples that became keys.
+    pub keys: Vec<usize>,
+    /// What is stored for each.
+    pub values: Vec<f32>,
+}
+
+/// How much wider than the tolerance pieces between exact keys may be tried, so that keys moved off the curve bring them within it:
+/// a chord errs to one side, and moving it to the middle of its error halves it.
+const WIDER: [f64; 4] = [2.0, 1.7, 1.4, 1.2];
+
+/// Few keys whose straight pieces stay within `tolerance` of every sample; the first and the last are exact, so that loops close.
+/// `stored` is what a file will hold of a value: pieces are tried as they will be played.
+pub(super) fn fitted(s: &Samples, tolerance: f64, stored: impl Fn(&[f32]) -> Vec<f32>) -> Pieces {
+    let exact = straight(s, tolerance, &stored);
+    for wider in WIDER {
+        let mut pieces = straight(s, wider * tolerance, &stored);
+        if pieces.keys.len() < exact.keys.len() {
+            settle(s, &mut pieces, &stored);
+            if s.holds(&pieces, tolerance) {
+                return pieces;
+            }
+        }
+    }
+    exact
+}
+
+impl Samples {
+    /// Whether the pieces stay within the tolerance of every sample.
+    fn holds(&self, p: &Pieces, tolerance: f64) -> bool {
+        let w = self.width;
+        p.keys.windows(2).enumerate().all(|(k, ends)| {
+            let (a, b) = (&p.values[k * w..(k + 1) * w], &p.values[(k + 1) * w..(k + 2) * w]);
+            let h = self.times[ends[1]] - self.times[ends[0]];
+            (ends[0]..=ends[1]).all(|i| {
+                let u = if h > 0.0 {
+                    ((self.times[i] - self.times[ends[0]]) / h) as f32
+                } else {
+                    (i - ends[0]) as f32
+                };
+                off(self.kind, a, b, u, self.value(i)) <= tolerance
+            })
+        })
+    }
+}
+
+/// Move the keys between jumps to where the squares of all samples' errors are least: a tridiagonal system for each component.
+fn settle(s: &Samples, p: &mut Pieces, stored: &impl Fn(&[f32]) -> Vec<f32>) {
+    let n = p.keys.len();
+    let (mut from, w) = (0, s.width);
+    while from + 1 < n {
+        let to = (from..n - 1).find(|&k| s.jumps(p.keys[k])).unwrap_or(n - 1);
+        if to > from + 1 {
+            for (k, v) in settled(s, &p.keys[from..=to]).chunks(w).enumerate() {
+                let v = if s.kind == Kind::Rotation {
+                    rotation::unit(Quat::from_slice(v)).to_array().to_vec()
+                } else {
+                    v.to_vec()
+                };
+                p.values[(from + 1 + k) * w..(from + 2 + k) * w].copy_from_slice(&stored(&v));
+            }
+        }
+        from = (to + 1).max(from + 1);
+    }
+}
+
+/// Values of the inner ones of these keys.
+fn settled(s: &Samples, keys: &[usize]) -> Vec<f32> {
+    let (n, w) = (keys.len() - 2, s.width);
+    let (mut diagonal, mut beside) = (vec![0.0_f64; n], vec![0.0_f64; n]);
+    let mut right = vec![0.0_f64; n * w];
+    for (k, ends) in keys.windows(2).enumerate() {
+        let h = s.times[ends[1]] - s.times[ends[0]];
+        // The sample at a key belongs to the piece that it ends.
+        for i in ends[0] + 1..=ends[1] {
+            let u = (s.times[i] - s.times[ends[0]]) / h;
+            let (left, own) = (k.checked_sub(1), Some(k).filter(|&k| k < n));
+            for (row, weight) in [(left, 1.0 - u), (own, u)] {
+                let Some(row) = row else { continue };
+                diagonal[row] += weight * weight;
+                for c in 0..w {
+                    right[row * w + c] += weight * s.value(i)[c] as f64;
+                }
+            }
+            match (left, own) {
+                (Some(l), Some(_)) => beside[l] += u * (1.0 - u),
+                // The ends are known.
+                (Some(l), None) => {
+                    (0..w).for_each(|c| right[l * w + c] -= u * (1.0 - u) * s.value(keys[n + 1])[c] as f64)
+                }
+                (None, Some(o)) => {
+                    (0..w).for_each(|c| right[o * w + c] -= u * (1.0 - u) * s.value(keys[0])[c] as f64)
+                }
+                (None, None) => {}
+            }
+        }
+    }
+    for r in 1..n {
+        let m = beside[r - 1] / diagonal[r - 1];
+        diagonal[r] -= m * beside[r - 1];
+        for c in 0..w {
+            right[r * w + c] -= m * right[(r - 1) * w + c];
+        }
+    }
+    for r in (0..n).rev() {
+        for c in 0..w {
+            let next = if r + 1 < n { beside[r] * right[(r + 1) * w + c] } else { 0.0 };
+            right[r * w + c] = (right[r * w + c] - next) / diagonal[r];
+        }
+    }
+    right.iter().map(|v| *v as f32).collect()
+}
+
+/// The fewest keys from sample `0` to the last whose straight pieces stay within `tolerance` of every sample.
+fn straight(s: &Samples, tolerance: f64, stored: &impl Fn(&[f32]) -> Vec<f32>) -> Pieces {
+    let n = s.len();
+    let mut out = Pieces { keys: vec![0], values: stored(s.value(0)) };
+    let mut from = 0;
+    while from + 1 < n {
+        if s.jumps(from) {
+            // Two keys at one time; the piece between them has no length.
+            from += 1;
+        } else {
+            from = reach(s, from, tolerance, stored);
+        }
+        out.keys.push(from);
+        out.values.extend(stored(s.value(from)));
+    }
+    out
+}
+
+/// All keys of the curve as they are, for tracks whose times others share.
+pub(super) fn all(s: &Samples, stored: impl Fn(&[f32]) -> Vec<f32>) -> Pieces {
+    Pieces { keys: s.own.clone(), values: s.own.iter().flat_map(|&i| stored(s.value(i))).collect() }
+}
+
+/// The last sample that a straight piece from `from` may end at: doubling steps, then bisection.
+fn reach(s: &Samples, from: usize, tolerance: f64, stored: &impl Fn(&[f32]) -> Vec<f32>) -> usize {
+    let a = stored(s.value(from));
+    let end = (from + 1..s.len()).find(|&i| s.jumps(i)).unwrap_or(s.len() - 1);
+    let fits = |to: usize| {
+        let b = stored(s.value(to));
+        let h = s.times[to] - s.times[from];
+        (from + 1..to).all(|i| {
+            let u = ((s.times[i] - s.times[from]) / h) as f32;
+            off(s.kind, &a, &b, u, s.value(i)) <= tolerance
+        })
+    };
+    let (mut good, mut step) = (from + 1, 1);
+    let mut bad = end + 1;
+    while good + step <= end {
+        if !fits(good + step) {
+            bad = good + step;
+            break;
+        }
+        good += step;
+        step *= 2;
+    }
+    while bad - good > 1 {
+        let middle = good + (bad - good) / 2;
+        if fits(middle) { good = middle } else { bad = middle }
+    }
+    good.min(end)
+}
+
+/// How far a straight piece from `a` to `b` is from a value at `u`.
+fn off(kind: Kind, a: &[f32], b: &[f32], u: f32, value: &[f32]) -> f64 {
+    match kind {
+        Kind::Rotation => {
+            let q = rotation::slerp(Quat::from_slice(a), Quat::from_slice(b), u);
+            rotation::angle_between(q, Quat::from_slice(value)) as f64
+        }
+        Kind::Vector => wide(a).lerp(wide(b), u as f64).distance(wide(value)),
+        Kind::Weights => {
+            let each = a.iter().zip(b).zip(value).map(|((a, b), v)| (a + (b - a) * u - v).abs() as f64);
+            each.fold(0.0, f64::max)
+        }
+    }
+}

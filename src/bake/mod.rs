@@ -1,0 +1,144 @@
+//! Curves to curves within a stated error on the skin.
+//!
+//! Each track gets the fewest keys that keep it within a tolerance of its own: its share of the error divided by its lever, the
+//! distance to the farthest vertex that it moves. The shares are then grown together, and one by one, as long as the worst vertex
+//! stays within what was asked for. What is promised was measured on the vertices, at keys, at frames and between them.
+
+pub mod edit;
+mod fit;
+mod gauge;
+mod plan;
+mod times;
+
+pub use gauge::{Gauge, Lever, Metric, Spot, Worst};
+
+use crate::character::Character;
+use crate::clip::Clip;
+use crate::skeleton::BoneId;
+use plan::Plan;
+
+/// How a clip is to be baked.
+///
+/// ```
+/// use sinew::bake::BakeDesc;
+/// let half_a_millimetre = BakeDesc { tolerance: 5e-4, ..BakeDesc::default() };
+/// assert!(half_a_millimetre.quantize);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct BakeDesc {
+    /// Metres that any point may be off at any time.
+    pub tolerance: f64,
+    /// Which points.
+    pub metric: Metric,
+    /// Bones whose origin and tip may be off by so many metres only.
+    pub pins: Vec<(BoneId, f64)>,
+    /// Rotations may be stored as normalised 16-bit integers, where the bound allows.
+    pub quantize: bool,
+    /// Worker threads; the result does not depend on them.
+    pub threads: usize,
+}
+
+impl Default for BakeDesc {
+    /// A millimetre, on the skin.
+    fn default() -> Self {
+        Self { tolerance: 1e-3, metric: Metric::Vertices, pins: vec![], quantize: true, threads: 1 }
+    }
+}
+
+/// What was reached.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Report {
+    /// The worst point that was found.
+    pub worst: Worst,
+    /// No point is farther off than that share of what it may: the worst found, and what may hide between the moments looked at.
+    pub ceiling: f64,
+    /// Moments at which all vertices were compared.
+    pub moments: usize,
+    /// Keys before and after.
+    pub keys: [usize; 2],
+    /// Bytes of keys before and after, as glTF stores them: times that several tracks share count once.
+    pub bytes: [usize; 2],
+}
+
+/// A clip that does what another does, within an error.
+#[derive(Clone, Debug, Default)]
+pub struct Baked {
+    /// The new clip.
+    pub clip: Clip,
+    /// For each track, whether its values are 16-bit integers in the file.
+    pub short: Vec<bool>,
+    /// What was reached.
+    pub report: Report,
+}
+
+/// Why a clip cannot be baked.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum BakeError {
+    /// A tolerance that is not a positive number.
+    #[error("a tolerance of {found} m; expected more than 0")]
+    Tolerance {
+        /// What was asked for.
+        found: f64,
+    },
+    /// Vertices are to keep a bound, and there are none.
+    #[error(
+        "there is no skin that could keep a bound; measure a shell around the bones instead (`--metric shell:3cm`)"
+    )]
+    NoSkin,
+    /// The bound cannot be kept.
+    #[error(
+        "clip `{clip}`: asked for {tolerance:.3e} m, reached {reached:.3e} m at {time:.4} s; single precision holds no less here: \
+         ask for more"
+    )]
+    Missed {
+        /// Which clip.
+        clip: String,
+        /// Metres asked for.
+        tolerance: f64,
+        /// Metres reached.
+        reached: f64,
+        /// Where, seconds.
+        time: f64,
+    },
+}
+
+/// Find few keys that move the character as `clip` does.
+///
+/// # Errors
+/// [`BakeError`]: a tolerance that is none, or one that is finer than single precision.
+///
+/// # Panics
+/// If the clip is not of the character.
+pub fn bake(character: &Character, clip: &Clip, desc: &BakeDesc) -> Result<Baked, BakeError> {
+    let mut asked = std::iter::once(desc.tolerance).chain(desc.pins.iter().map(|p| p.1));
+    if let Some(found) = asked.find(|t| t.is_nan() || *t <= 0.0) {
+        return Err(BakeError::Tolerance { found });
+    }
+    let vertices = character.instances().iter().map(|i| character.mesh(i).positions.len()).sum::<usize>();
+    if vertices == 0 && desc.metric == Metric::Vertices {
+        return Err(BakeError::NoSkin);
+    }
+    let gauge = Gauge::of(character, desc);
+    let mut plan = Plan::new(character, clip, &gauge, desc);
+    let mut baked = plan.search(&gauge);
+    let mut share = 1.0;
+    for _ in 0..8 {
+        let (worst, ceiling, moments) = times::verify(&gauge, clip, &baked.clip);
+        let report = &mut baked.report;
+        (report.worst, report.ceiling, report.moments) = (worst, ceiling, moments);
+        if ceiling <= 1.0 {
+            return Ok(baked);
+        }
+        // What hid between the moments of the search: aim a little lower.
+        share *= (0.95 / ceiling).min(0.9);
+        baked = plan.within(share);
+    }
+    let plain = plan.untouched();
+    let (worst, ceiling, moments) = times::verify(&gauge, clip, &plain.clip);
+    if ceiling <= 1.0 {
+        return Ok(Baked { report: Report { worst, ceiling, moments, ..plain.report }, ..plain });
+    }
+    let clip = clip.name.clone();
+    let (tolerance, reached) = (worst.limit, ceiling * worst.limit);
+    Err(BakeError::Missed { clip, tolerance, reached, time: worst.time })
+}

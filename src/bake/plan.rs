@@ -1,0 +1,297 @@
+//! How the error is shared among the tracks.
+
+use super::fit::{self, Kind, Samples};
+use super::gauge::Gauge;
+use super::{BakeDesc, Baked, Report, times};
+use crate::character::Character;
+use crate::clip::{Clip, Curve, Interpolation, Target, Track};
+use std::collections::BTreeSet;
+
+/// Moments at which levers are measured.
+const LEVER_MOMENTS: usize = 24;
+
+/// Moments at which the search compares vertices.
+const SEARCH_MOMENTS: usize = 400;
+
+/// Vertices times moments that the search may compare in all.
+const SEARCH_WORK: usize = 400_000_000;
+
+/// Largest error of a normalised 16-bit quaternion, radians, and of its interpolation.
+const SHORT_ERROR: f64 = 7e-5;
+
+/// A track on its way.
+struct Job {
+    target: Target,
+    source: Curve,
+    samples: Samples,
+    /// What it shows without keys.
+    rest: Vec<f32>,
+    /// Metres that a unit of its error may move a vertex by.
+    lever: f64,
+    /// Its share beside the others'.
+    weight: f64,
+    /// What it was made into with the share at hand; none if it only shows the rest.
+    made: Option<(Curve, bool)>,
+}
+
+/// All tracks of a clip.
+pub(super) struct Plan<'a> {
+    clip: &'a Clip,
+    desc: BakeDesc,
+    jobs: Vec<Job>,
+    share: f64,
+    moments: Vec<f64>,
+    vertices: usize,
+}
+
+impl<'a> Plan<'a> {
+    pub fn new(character: &Character, clip: &'a Clip, gauge: &Gauge, desc: &BakeDesc) -> Self {
+        let levers = gauge.levers(clip, &times::coarse(clip, LEVER_MOMENTS));
+        let longest = levers.iter().map(|l| l.turn).fold(0.0, f64::max);
+        let rest = character.rest_pose();
+        let targets = character.target_reach();
+        let vertices = character.instances().iter().map(|i| character.mesh(i).positions.len()).sum();
+        let mut jobs: Vec<Job> = vec![];
+        for track in &clip.tracks {
+            let at = |b: crate::skeleton::BoneId| levers[b.index()].turn.max(0.02 * longest).max(1e-9);
+            let (kind, lever, rest) = match track.target {
+                Target::Rotation(b) => {
+                    (Kind::Rotation, at(b), rest.locals[b.index()].rotation.to_array().to_vec())
+                }
+                Target::Translation(b) => (
+                    Kind::Vector,
+                    levers[b.index()].shift.max(1e-9),
+                    rest.locals[b.index()].translation.to_array().to_vec(),
+                ),
+                Target::Scale(b) => (Kind::Vector, at(b), rest.locals[b.index()].scale.to_array().to_vec()),
+                Target::Xzx(b) => (Kind::Vector, at(b), vec![0.0; 3]),
+                Target::Weights { first } => {
+                    let run = first..first + track.curve.width();
+                    let reach = targets[run.clone()].iter().sum::<f64>().max(1e-9);
+                    (Kind::Weights, reach, rest.weights[run].to_vec())
+                }
+            };
+            let samples = Samples::of(&track.curve, kind);
+            let job = Job {
+                target: track.target.clone(),
+                source: track.curve.clone(),
+                samples,
+                rest,
+                lever,
+                weight: 1.0,
+                made: None,
+            };
+            jobs.push(job);
+        }
+        let moments = times::coarse(clip, SEARCH_MOMENTS);
+        Self { clip, desc: desc.clone(), jobs, share: 0.5, moments, vertices }
+    }
+
+    /// The largest shares that keep the bound at the search's moments: all together first, then one after the other.
+    pub fn search(&mut self, gauge: &Gauge) -> Baked {
+        let aim = 0.97;
+        let mut best = 0.0;
+        let (mut low, mut high) = (1e-4, f64::INFINITY);
+        for _ in 0..14 {
+            self.make_all();
+            let error = gauge.worst(self.clip, &self.assemble(), &self.moments).share();
+            if error <= aim {
+                (best, low) = (self.share, self.share);
+            } else {
+                high = self.share;
+            }
+            if high < 1.03 * low {
+                break;
+            }
+            // Errors grow about as the share does.
+            let guess = self.share * 0.98 * aim / error.max(1e-30);
+            self.share = if high.is_infinite() {
+                guess.clamp(1.3 * low, 4.0 * low)
+            } else if guess > 1.01 * low && guess < 0.99 * high {
+                guess
+            } else {
+                (low * high).sqrt()
+            };
+        }
+        self.share = best;
+        self.make_all();
+        self.widen(gauge, aim);
+        self.finish()
+    }
+
+    /// Give single tracks more where the worst vertex does not notice.
+    fn widen(&mut self, gauge: &Gauge, aim: f64) {
+        let mut work = SEARCH_WORK / (self.vertices * self.moments.len()).max(1);
+        for factor in [2.5, 1.6, 1.25] {
+            // Those with most keys have most to give.
+            let mut order: Vec<usize> = (0..self.jobs.len()).collect();
+            order.sort_by_key(|&i| (std::cmp::Reverse(self.jobs[i].keys()), i));
+            for i in order {
+                let before = self.jobs[i].keys();
+                if before <= 1 || work == 0 {
+                    continue;
+                }
+                let kept = (self.jobs[i].weight, self.jobs[i].made.clone());
+                self.jobs[i].weight *= factor;
+                self.make(i);
+                if self.jobs[i].keys() < before {
+                    work -= 1;
+                    if gauge.worst(self.clip, &self.assemble(), &self.moments).share() <= aim {
+                        continue;
+                    }
+                }
+                (self.jobs[i].weight, self.jobs[i].made) = kept;
+            }
+        }
+    }
+
+    /// With a part of the shares.
+    pub fn within(&mut self, part: f64) -> Baked {
+        self.share *= part;
+        self.make_all();
+        self.finish()
+    }
+
+    /// Nothing left out.
+    pub fn untouched(&mut self) -> Baked {
+        for job in &mut self.jobs {
+            job.made = Some((job.source.clone(), false));
+        }
+        self.finish()
+    }
+
+    fn make_all(&mut self) {
+        (0..self.jobs.len()).for_each(|i| self.make(i));
+    }
+
+    fn make(&mut self, i: usize) {
+        let job = &mut self.jobs[i];
+        let allowed = self.share * job.weight * self.desc.tolerance / job.lever;
+        job.made = job.reduced(allowed, self.desc.quantize);
+    }
+
+    fn assemble(&self) -> Clip {
+        let tracks = self.jobs.iter().filter_map(|j| {
+            let (curve, _) = j.made.as_ref()?;
+            Some(Track { target: j.target.clone(), curve: curve.clone() })
+        });
+        let mut clip = Clip { name: self.clip.name.clone(), tracks: tracks.collect() };
+        self.hold_ends(&mut clip);
+        clip
+    }
+
+    /// A clip lasts as long as it did: the shortest track says so where what moved at the ends is gone.
+    fn hold_ends(&self, clip: &mut Clip) {
+        let (want, found) = (self.clip.range(), clip.range());
+        if clip.tracks.is_empty() {
+            // One that moves nothing still lasts.
+            let Some(job) = self.jobs.iter().min_by_key(|j| j.rest.len()) else { return };
+            let curve = Curve::new(vec![want.start], job.rest.clone(), job.rest.len(), Interpolation::Hold);
+            clip.tracks.extend(curve.ok().map(|curve| Track { target: job.target.clone(), curve }));
+            return self.hold_ends(clip);
+        }
+        for (missing, time, first) in
+            [(found.start > want.start, want.start, true), (found.end < want.end, want.end, false)]
+        {
+            let shortest = clip.tracks.iter_mut().min_by_key(|t| (t.curve.times().len(), t.curve.width()));
+            let Some(track) = shortest.filter(|_| missing) else { continue };
+            track.curve = with_end(&track.curve, time, first);
+        }
+    }
+
+    fn finish(&self) -> Baked {
+        let clip = self.assemble();
+        let short: Vec<bool> = self.jobs.iter().filter_map(|j| j.made.as_ref()).map(|m| m.1).collect();
+        let keys = [self.clip.key_count(), clip.key_count()];
+        let bytes = [bytes(self.clip, &[]), bytes(&clip, &short)];
+        Baked { clip, short, report: Report { keys, bytes, ..Report::default() } }
+    }
+}
+
+/// A curve that holds its first or last value for longer.
+fn with_end(curve: &Curve, time: f64, first: bool) -> Curve {
+    let (mut times, mut values) = (curve.times().to_vec(), curve.values().to_vec());
+    let n = times.len();
+    let each = values.len() / n;
+    let (at, from) = if first { (0, 0) } else { (n, (n - 1) * each) };
+    times.insert(at, time);
+    let end = values[from..from + each].to_vec();
+    values.splice(at * each..at * each, end);
+    Curve::new(times, values, curve.width(), curve.interpolation()).expect("a curve and a key beyond its end")
+}
+
+/// Bytes of a clip's keys in glTF.
+pub(super) fn bytes(clip: &Clip, short: &[bool]) -> usize {
+    let mut times = BTreeSet::new();
+    let mut sum = 0;
+    for (i, track) in clip.tracks.iter().enumerate() {
+        let bits: Vec<u64> = track.curve.times().iter().map(|t| t.to_bits()).collect();
+        if times.insert(bits) {
+            sum += 4 * track.curve.times().len();
+        }
+        sum += track.curve.values().len() * if short.get(i) == Some(&true) { 2 } else { 4 };
+    }
+    sum
+}
+
+impl Job {
+    fn keys(&self) -> usize {
+        self.made.as_ref().map_or(0, |m| m.0.times().len())
+    }
+
+    /// The fewest keys within `allowed`, and whether they are 16-bit integers.
+    fn reduced(&self, allowed: f64, quantize: bool) -> Option<(Curve, bool)> {
+        let s = &self.samples;
+        if s.is_constant(&self.rest, allowed) {
+            return None;
+        }
+        let short = quantize && s.kind == Kind::Rotation && SHORT_ERROR < 0.3 * allowed;
+        let stored = |v: &[f32]| if short { v.iter().map(|x| shortened(*x)).collect() } else { v.to_vec() };
+        let first = stored(s.value(0));
+        if s.is_constant(&first, allowed) {
+            let curve = Curve::new(vec![s.times[0]], first, s.width, Interpolation::Hold);
+            return curve.ok().map(|c| (c, short));
+        }
+        if self.source.interpolation() == Interpolation::Hold {
+            return Some((self.steps(allowed, stored), short));
+        }
+        let mut pieces = fit::fitted(s, allowed, &stored);
+        // Keys that stay where all of them were share their times with other tracks.
+        let value = s.width * if short { 2 } else { 4 };
+        if self.source.interpolation() == Interpolation::Linear
+            && pieces.keys.len() * (value + 4) > s.own.len() * value
+        {
+            pieces = fit::all(s, stored);
+        }
+        // A cubic that straight pieces would only make longer stays as it is.
+        if self.source.interpolation() == Interpolation::Hermite {
+            let own = self.source.times().len() * (12 * s.width + 4);
+            if pieces.keys.len() * (value + 4) >= own {
+                return Some((self.source.clone(), false));
+            }
+        }
+        let times = pieces.keys.iter().map(|&k| s.times[k]).collect();
+        let curve = Curve::new(times, pieces.values, s.width, Interpolation::Linear);
+        Some((curve.expect("keys of a curve, in order"), short))
+    }
+
+    /// Steps whose value changes.
+    fn steps(&self, allowed: f64, stored: impl Fn(&[f32]) -> Vec<f32>) -> Curve {
+        let (mut times, mut values) = (vec![], Vec::<f32>::new());
+        let width = self.samples.width;
+        for (k, &t) in self.source.times().iter().enumerate() {
+            let v = self.source.value(k);
+            let last = values.len().checked_sub(width).map(|from| &values[from..]);
+            if last.is_none_or(|last| self.samples.distance(last, v) > allowed) {
+                times.push(t);
+                values.extend(stored(v));
+            }
+        }
+        Curve::new(times, values, width, Interpolation::Hold).expect("keys of a curve, in order")
+    }
+}
+
+/// What a normalised 16-bit integer holds of a number in −1…1.
+fn shortened(x: f32) -> f32 {
+    (x * 32767.0).round().clamp(-32767.0, 32767.0) / 32767.0
+}
