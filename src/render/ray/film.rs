@@ -23,9 +23,9 @@ pub(super) struct Tile {
     /// Light, premultiplied, and alpha, summed over samples.
     sums: Vec<[f64; 4]>,
     counts: Vec<u32>,
-    /// Sums of brightness, as far as it shows, and of its square.
+    /// Sums of brightness, as far as it shows, and of its square; empty if nobody asks for them.
     moments: Vec<[f64; 2]>,
-    /// Pixels that need more.
+    /// Pixels that need more; empty if all do.
     active: Vec<bool>,
 }
 
@@ -50,8 +50,7 @@ impl Film {
                     size,
                     sums: vec![[0.0; 4]; n],
                     counts: vec![0; n],
-                    moments: vec![[0.0; 2]; n],
-                    active: vec![true; n],
+                    ..Tile::default()
                 });
             }
         }
@@ -98,7 +97,7 @@ impl Film {
             if finished.into_inner() == tiles {
                 done += n;
             }
-            if self.tiles.iter().all(|t| !t.active.contains(&true)) {
+            if settings.error.is_some() && self.tiles.iter().all(|t| !t.active.contains(&true)) {
                 break;
             }
         }
@@ -123,6 +122,10 @@ impl Film {
 }
 
 impl Tile {
+    fn needs(&self, place: usize) -> bool {
+        self.active.get(place).is_none_or(|a| *a)
+    }
+
     /// One more sample of each pixel that needs it.
     fn sample<R: Real>(
         &mut self,
@@ -137,7 +140,7 @@ impl Tile {
         wave.sums.clear();
         wave.sums.resize(self.sums.len(), [0.0; 4]);
         wave.paths.clear();
-        for place in (0..self.sums.len()).filter(|&p| self.active[p]) {
+        for place in (0..self.sums.len()).filter(|&p| self.needs(p)) {
             let [x, y] = pixel(place);
             let [dx, dy] = match settings.samples {
                 0 | 1 => [0.5; 2],
@@ -147,15 +150,21 @@ impl Tile {
         }
         let here = Here { settings, corner: self.corner, width, index };
         wave.run(stage, here, |path| known(stage, path, pixel(path.place as usize)));
-        for place in (0..self.sums.len()).filter(|&p| self.active[p]) {
+        for place in 0..self.sums.len() {
+            if !self.needs(place) {
+                continue;
+            }
             let light = wave.sums[place];
             for c in 0..4 {
                 self.sums[place][c] += light[c];
             }
-            let shown = light[..3].iter().map(|c| c.clamp(0.0, 1.0)).sum::<f64>() / 3.0;
-            self.moments[place][0] += shown;
-            self.moments[place][1] += shown * shown;
             self.counts[place] += 1;
+            if settings.error.is_some() {
+                self.moments.resize(self.sums.len(), [0.0; 2]);
+                let shown = light[..3].iter().map(|c| c.clamp(0.0, 1.0)).sum::<f64>() / 3.0;
+                self.moments[place][0] += shown;
+                self.moments[place][1] += shown * shown;
+            }
         }
     }
 
@@ -169,6 +178,7 @@ impl Tile {
             self.counts[p] < LEAST || spread / n > error * error
         };
         let open: Vec<bool> = (0..w * h).map(open).collect();
+        self.active.resize(w * h, true);
         for p in 0..w * h {
             let (x, y) = (p % w, p / w);
             let mut near = (y.saturating_sub(1)..(y + 2).min(h))

@@ -8,6 +8,12 @@ use super::{RayCount, RaySettings};
 use crate::render::shade::LampKind;
 use glam::{DVec3, Vec3};
 
+/// The least that light counts which has met glass.
+const FAINT: f64 = 1e-4;
+
+/// Rays of a tile that are on their way at once, at most: surfaces that give back more than they get stop here.
+const MOST: usize = 1 << 18;
+
 /// A ray that is on its way to a pixel, and what its light counts there.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Path {
@@ -153,14 +159,16 @@ impl Wave {
         finish: &Finish,
         alpha: f64,
     ) {
-        let settings = here.settings;
+        // Each meeting with glass makes two rays of one; those that are too faint are left out whatever the settings say.
+        let least = if finish.is_glass() { FAINT } else { 0.0 };
+        let cutoff = here.settings.cutoff.max(least);
         if alpha < 1.0 {
             // The same ray, from the next number on: what is seen through a surface does not move.
             let near = next_up::<R>(hit.t);
             let (weight, cover) = (path.weight * (1.0 - alpha), path.cover * (1.0 - alpha));
-            self.push(settings, Path { near, weight, cover, ..*path });
+            self.push(cutoff, Path { near, weight, cover, ..*path });
         }
-        let ends = path.bounce >= settings.depth;
+        let ends = path.bounce >= here.settings.depth;
         if ends || !finish.is_glass() && finish.mirror.max_element() <= 0.0 {
             let rest = if finish.is_glass() { path.cover * alpha } else { 0.0 };
             return add(&mut self.sums[path.place as usize], DVec3::ZERO, rest);
@@ -185,24 +193,24 @@ impl Wave {
         let mirrored = if level.dot(face) > 0.0 { level } else { optics::mirrored(d, face) };
         let turned = [dx, dy].map(|v| optics::mirrored(v.as_dvec3(), face).as_vec3());
         if finish.mirror.max_element() > 0.0 {
-            self.push(settings, on(mirrored, turned, finish.mirror, 0.0));
+            self.push(cutoff, on(mirrored, turned, finish.mirror, 0.0));
         }
         if finish.is_glass() {
             let bent = optics::refracted(d, n, if hit.back { finish.ior } else { 1.0 / finish.ior });
             let bent = bent.filter(|b| b.0.dot(face) < 0.0);
             let share = bent.map_or(1.0, |b| b.1);
             add(&mut self.sums[path.place as usize], DVec3::ZERO, path.cover * share * alpha);
-            self.push(settings, on(mirrored, turned, DVec3::splat(share), 0.0));
+            self.push(cutoff, on(mirrored, turned, DVec3::splat(share), 0.0));
             if let Some((t, share)) = bent {
                 let cover = path.cover * (1.0 - share) * alpha;
-                self.push(settings, on(t, [dx, dy], finish.transmission * (1.0 - share), cover));
+                self.push(cutoff, on(t, [dx, dy], finish.transmission * (1.0 - share), cover));
             }
         }
     }
 
     /// Send a ray on if its light still counts.
-    fn push(&mut self, settings: &RaySettings, path: Path) {
-        if path.weight.max_element().max(path.cover) > settings.cutoff {
+    fn push(&mut self, cutoff: f64, path: Path) {
+        if path.weight.max_element().max(path.cover) > cutoff && self.next.len() < MOST {
             self.next.push(path);
         }
     }
