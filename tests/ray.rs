@@ -325,12 +325,15 @@ mod characters {
         [0, w, 2 * w].into_iter().flat_map(move |row| (0..3).map(move |k| (i + row + k).wrapping_sub(w + 1)))
     }
 
-    /// Off silhouettes, where a pixel's neighbours are something else or lie apart (of what blends, too), pictures are the same to one code,
+    /// Off silhouettes, where a pixel's neighbours are something else or lie apart (of what blends, too), and off a texture's seams, pictures are the same to one code,
     /// depths to 1e-4. Silhouettes behind what blends are in no channel: where they are, pixels may differ: in `hidden` of them at most.
     fn compare(what: &str, a: &(Image, Channels), b: &(Image, Channels), layers: &Channels, hidden: usize) {
         let apart = |c: &Channels, i: usize, j: usize| {
             let z = c.depth[i];
-            j >= c.objects.len() || c.objects[j] != c.objects[i] || (c.depth[j] - z).abs() > 0.01 * z
+            j >= c.objects.len()
+                || c.objects[j] != c.objects[i]
+                || (c.depth[j] - z).abs() > 0.01 * z
+                || c.uvs[j].distance(c.uvs[i]) > 0.2
         };
         let edge = |i: usize| around(i, a.1.width).any(|j| apart(&a.1, i, j) || apart(layers, i, j));
         let (mut compared, mut differ) = (0, 0);

@@ -53,7 +53,8 @@ pub(super) struct Batch<'a> {
     pub spots: [Spot; 8],
 }
 
-/// What is to be lit.
+/// What is to be lit. One at a time lives, on the stack.
+#[allow(clippy::large_enum_variant)]
 pub(super) enum Dressed<R: Real> {
     Scene(Surface<F8>),
     Plain(Surface<R::Wide>),

@@ -93,7 +93,7 @@ impl Film {
                     }
                 }
             };
-            crate::render::each(waves.iter_mut().collect(), &work);
+            crate::render::each(waves.iter_mut().collect(), work);
             if finished.into_inner() == tiles {
                 done += n;
             }
