@@ -63,7 +63,7 @@ fn no_vertex_leaves_its_tolerance_at_keys_frames_or_between() {
     let (character, bones) = arm();
     let clip = swing(&bones);
     let mut keys = usize::MAX;
-    for tolerance in [1e-4, 1e-3, 1e-2] {
+    for tolerance in [1e-4, 1e-2, 1e-1] {
         let baked = bake(&character, &clip, &desc(tolerance)).unwrap();
         let error = measured(&character, &clip, &baked.clip, (0..=20_000).map(|k| k as f64 * 1e-4));
         assert!(
@@ -71,13 +71,14 @@ fn no_vertex_leaves_its_tolerance_at_keys_frames_or_between() {
             "{error} {:?}",
             baked.report
         );
-        // Nearly all of the tolerance is made use of.
-        assert!(error > 0.5 * tolerance, "{error}");
+        // Where keys can be spared, most of the tolerance is made use of.
+        let report = baked.report;
+        assert!(error > 0.5 * tolerance || report.keys[1] == report.keys[0], "{error} {report:?}");
         assert!(baked.report.keys[1] < keys, "{:?}", baked.report);
         keys = baked.report.keys[1];
         assert_eq!(baked.clip.range(), clip.range());
     }
-    assert!(keys < 80, "{keys}");
+    assert!(keys < 60, "{keys}");
 }
 
 #[test]
@@ -179,7 +180,8 @@ fn file() -> (Vec<u8>, Import) {
 fn a_file_with_other_clips_keeps_everything_else() {
     let (bytes, import) = file();
     let character = &import.asset.character;
-    let baked = bake(character, &character.clips()[0], &desc(1e-4)).unwrap();
+    let desc = BakeDesc { metric: Metric::Shell(0.1), ..desc(1e-4) };
+    let baked = bake(character, &character.clips()[0], &desc).unwrap();
     let new = NewClip { clip: &baked.clip, short: &baked.short, replaces: Some(0) };
     let extras = serde_json::json!({"sinew": {"tolerance": 1e-4}}).as_object().unwrap().clone();
     let out = gltf::with_clips(&bytes, None, "file.glb", &import, &[new], extras).unwrap();

@@ -200,6 +200,10 @@ fn eval_and_info_speak_json() {
     let v: serde_json::Value = serde_json::from_slice(&out.stdout).expect("JSON");
     assert_eq!((&v["meshes"][0]["V"], &v["meshes"][0]["closed"]), (&3.into(), &false.into()));
     assert_eq!(v["clips"][0]["name"], "wave");
+
+    let out = sinew(&["info", &input, "--intersections", "--at", "0.5", "--clip", "wave", "--json"]);
+    let v: serde_json::Value = serde_json::from_slice(&out.stdout).expect("JSON");
+    assert_eq!(v["intersections"], serde_json::json!({ "clip": 0, "t": 0.5, "count": 0, "pairs": [] }));
 }
 
 #[test]

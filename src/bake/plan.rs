@@ -255,7 +255,7 @@ impl Job {
         if self.source.interpolation() == Interpolation::Hold {
             return Some((self.steps(allowed, stored), short));
         }
-        let mut pieces = fit::fitted(s, allowed, &stored);
+        let mut pieces = fit::fitted(s, allowed, stored);
         // Keys that stay where all of them were share their times with other tracks.
         let value = s.width * if short { 2 } else { 4 };
         if self.source.interpolation() == Interpolation::Linear

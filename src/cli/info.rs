@@ -1,10 +1,11 @@
 //! `sinew info`: what is in a file.
 
-use super::{Failure, load, print, say, say::Say};
+use super::{Failure, find_clip, load_posed, print, say, say::Say};
 use serde_json::{Value, json};
-use sinew::character::Binding;
+use sinew::character::{Binding, Character, Scratch};
 use sinew::io::{Import, Options};
 use sinew::mesh::topology;
+use sinew::render::accel::{Accel, Kind};
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -12,9 +13,13 @@ const EXAMPLES: &str = "\
 Examples:
   sinew info fox.glb
   sinew info rigs/pip.json --json
+  sinew info rigs/pip.json --poses poses/pip.json --clip wave --at 0.5 --intersections   what goes through what
 
 V, E, F count the surface behind a mesh: vertices at one place are one, degenerate triangles none. A surface is closed when every
-edge has exactly two faces.";
+edge has exactly two faces.
+
+--intersections counts pairs of triangles that pass through or touch each other at a time: of one mesh, and of two. Neighbours
+count where they meet beyond their common corners; triangles that only lie on each other in one plane do not.";
 
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
@@ -24,12 +29,31 @@ pub struct Args {
     /// One JSON object instead of text.
     #[arg(long)]
     json: bool,
+    /// Which triangles pass through each other at a time.
+    #[arg(long, requires = "at")]
+    intersections: bool,
+    /// Seconds.
+    #[arg(long, value_name = "T", requires = "intersections", allow_hyphen_values = true)]
+    at: Option<f64>,
+    /// Clip by name or index; the first by default.
+    #[arg(long, value_name = "NAME|INDEX", requires = "intersections")]
+    clip: Option<String>,
+    /// Clips from this file instead of the input's.
+    #[arg(long, value_name = "FILE", requires = "intersections")]
+    poses: Option<PathBuf>,
 }
 
 pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     // Textures are read too, so that what is wrong with them is told.
-    let import = load(&args.input, Options { textures: true }, say)?;
-    let report = report(&import);
+    let import = load_posed(&args.input, args.poses.as_ref(), Options { textures: true }, say)?;
+    let mut report = report(&import);
+    if let Some(t) = args.at.filter(|_| args.intersections) {
+        if !t.is_finite() {
+            return Err(Failure::Usage(format!("--at {t}: expected seconds")));
+        }
+        let clip = find_clip(&import, args.clip.as_deref())?;
+        report["intersections"] = intersections(&import, clip, t);
+    }
     let mut text = if args.json { report.to_string() } else { as_text(&report) };
     text.push('\n');
     print(text.as_bytes())
@@ -89,6 +113,54 @@ fn report(import: &Import) -> Value {
     })
 }
 
+/// Pairs of triangles that meet at a time, by pairs of instances; the first of each with the bones that move them most.
+fn intersections(import: &Import, clip: Option<usize>, t: f64) -> Value {
+    let c = &import.asset.character;
+    let pose = c.pose(clip, t);
+    let posed = c.posed(&pose);
+    let (center, mut scratch) = (c.center(&posed), Scratch::default());
+    let accel = |i: usize| {
+        let mut positions = Vec::new();
+        c.positions(i, &pose, &posed, center, &mut scratch, &mut positions);
+        Accel::new(Kind::Tree, &positions, &c.mesh(&c.instances()[i]).triangles, 1)
+    };
+    let accels: Vec<Accel> = (0..c.instances().len()).map(accel).collect();
+    let mesh = |i: usize| c.instances()[i].mesh;
+    let mut total = 0;
+    let mut pairs = Vec::new();
+    for (i, j) in (0..accels.len()).flat_map(|i| (i..accels.len()).map(move |j| (i, j))) {
+        let found = if i == j { accels[i].self_crossings() } else { accels[i].crossings(&accels[j]) };
+        total += found.len();
+        let first = found
+            .iter()
+            .take(3)
+            .map(|&[a, b]| json!({ "triangles": [a, b], "bones": [bone(c, i, a), bone(c, j, b)] }));
+        let names = [mesh(i), mesh(j)].map(|m| c.meshes()[m.0 as usize].name.clone());
+        if !found.is_empty() {
+            let first: Vec<Value> = first.collect();
+            pairs.push(json!({ "instances": [i, j], "meshes": names, "count": found.len(), "first": first }));
+        }
+    }
+    json!({ "clip": clip, "t": t, "count": total, "pairs": pairs })
+}
+
+/// The bone that moves a triangle most: the largest sum of its corners' weights.
+fn bone(c: &Character, instance: usize, triangle: u32) -> &str {
+    let inst = &c.instances()[instance];
+    let id = match &inst.binding {
+        Binding::Bone(b) => Some(*b),
+        Binding::Skin { palette, weights } => {
+            let mut sums = vec![0.0; palette.len()];
+            for &v in &c.mesh(inst).triangles[triangle as usize] {
+                weights.of(v as usize).for_each(|(k, w)| sums[k] += w);
+            }
+            let most = (0..sums.len()).rev().max_by(|&a, &b| f32::total_cmp(&sums[a], &sums[b]));
+            most.map(|k| palette[k].0)
+        }
+    };
+    id.map_or("", |b| c.skeleton().name(b))
+}
+
 /// The same report for people.
 fn as_text(r: &Value) -> String {
     let list = |key: &str| r[key].as_array().cloned().unwrap_or_default();
@@ -143,6 +215,21 @@ fn as_text(r: &Value) -> String {
     }
     if r["lights"] != 0 {
         let _ = writeln!(t, "lights     {}", r["lights"]);
+    }
+    if let Some(found) = r.get("intersections") {
+        let _ = writeln!(t, "meeting    {} pairs of triangles at {} s", found["count"], found["t"]);
+        for p in found["pairs"].as_array().into_iter().flatten() {
+            let first = &p["first"][0];
+            let side = |k: usize| {
+                format!(
+                    "{} ({}, triangle {})",
+                    name(&p["meshes"][k]),
+                    name(&first["bones"][k]),
+                    first["triangles"][k]
+                )
+            };
+            let _ = writeln!(t, "           {}: first {} and {}", p["count"], side(0), side(1));
+        }
     }
     let _ = write!(t, "warnings   {}", list("warnings").len());
     t

@@ -98,10 +98,10 @@ impl Painter {
         wanted: &[Channel],
         out: &mut Channels,
     ) -> Stats {
-        if self.renderer == Renderer::Raster {
+        let Some(ray) = self.renderer.rays() else {
             return self.rasterizer.draw_channels(scene, settings, wanted, out);
-        }
-        self.tracer.draw_channels(scene, settings, wanted, out);
+        };
+        self.tracer.draw_channels(scene, settings, ray, wanted, out);
         Stats::default()
     }
 

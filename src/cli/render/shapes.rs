@@ -54,8 +54,8 @@ pub fn draw(
     let mut watch = renderer::watch(args.renderer.budget, bar.clone());
     let outcome = tracer.draw_shapes(scene, &settings, &ray, &mut *watch, &mut picture);
     bar.finish_and_clear();
-    let mut written = Written::default();
-    written.drawn = FrameStats { rays: outcome, ..FrameStats::default() };
+    let drawn = FrameStats { rays: outcome, ..FrameStats::default() };
+    let mut written = Written { drawn, ..Written::default() };
     let seen = match args.channels.names().is_empty() {
         true => Channels::default(),
         false => {

@@ -6,9 +6,8 @@
 
 use super::ray::Slab;
 use super::tree::Node;
-use super::triangle::{EMPTY, Meetings, Pack, Shear};
+use super::triangle::{Meetings, Pack, Shear};
 use crate::math::simd::Isa;
-use glam::Vec3A;
 use std::mem::MaybeUninit;
 
 /// Nodes above one another at most; builders halve what is left before they run out.
@@ -152,7 +151,9 @@ impl Lanes for Portable {
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 mod avx2 {
+    use super::super::triangle::EMPTY;
     use super::*;
+    use glam::Vec3A;
     use std::arch::x86_64::*;
 
     #[target_feature(enable = "avx2,fma")]

@@ -4,7 +4,7 @@ use super::Accel;
 use super::tree::{LEAF, Node};
 use super::triangle::{EMPTY, Pack};
 use glam::{DVec3, Vec3};
-use std::cmp::{Ordering, Reverse};
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 /// A point of a surface: `(1−u−v)·p₀ + u·p₁ + v·p₂` of a triangle.
@@ -20,16 +20,6 @@ pub struct Closest {
     pub u: f64,
     /// Weight of the third corner.
     pub v: f64,
-}
-
-/// A number that is not NaN.
-#[derive(PartialEq, PartialOrd)]
-struct Known(f64);
-impl Eq for Known {}
-impl Ord for Known {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.0.total_cmp(&other.0)
-    }
 }
 
 impl Accel {
@@ -57,8 +47,10 @@ impl Accel {
             self.packs.iter().for_each(|p| keep(&mut found, p, point, k, within));
             return found;
         }
-        let mut queue = BinaryHeap::from([Reverse((Known(0.0), 0u32))]);
-        while let Some(Reverse((Known(distance), at))) = queue.pop() {
+        // Distances are positive, so that their bits are ordered as they are.
+        let mut queue = BinaryHeap::from([Reverse((0u64, 0u32))]);
+        while let Some(Reverse((distance, at))) = queue.pop() {
+            let distance = f64::from_bits(distance);
             // Boxes are rounded by less than this; those that are farther are not looked into.
             let worst = if found.len() < k { within } else { found[k - 1].distance };
             if distance * (1.0 - 1e-12) > worst {
@@ -73,7 +65,7 @@ impl Accel {
                 let span = node.get(lane);
                 let (lo, hi) = (Vec3::from(span.lo).as_dvec3(), Vec3::from(span.hi).as_dvec3());
                 let away = (lo - point).max(point - hi).max(DVec3::ZERO).length();
-                queue.push(Reverse((Known(away), node.children[lane])));
+                queue.push(Reverse((away.to_bits(), node.children[lane])));
             }
         }
         found

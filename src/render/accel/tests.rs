@@ -81,7 +81,7 @@ fn agree<R: Real>(kinds: &[Accel], rays: usize) {
 
 /// The hit that all kinds find.
 fn same<R: Real>(kinds: &[Accel], ray: &Ray<R>) -> Option<Hit<R>> {
-    let odd = |h: &Hit<R>| h.triangle % 5 > 0;
+    let odd = |h: &Hit<R>| !h.triangle.is_multiple_of(5);
     let first = kinds[0].nearest(ray, |_| true);
     for k in kinds {
         assert_eq!(k.nearest(ray, |_| true), first, "{:?} {ray:?}", k.kind);
@@ -217,11 +217,15 @@ fn a_moved_object_is_hit_where_it_is() {
     let surface = Surface { positions: &positions, triangles: &triangles };
     let mut place = |i: usize| {
         let turn = glam::DQuat::from_rotation_arc(glam::DVec3::X, rng.point(1.0).as_dvec3().normalize());
-        let scale = glam::DVec3::new(if i % 2 == 0 { -0.5 } else { 0.5 }, 0.5, 0.5);
+        let scale = glam::DVec3::new(if i.is_multiple_of(2) { -0.5 } else { 0.5 }, 0.5, 0.5);
         glam::DAffine3::from_scale_rotation_translation(scale, turn, rng.point(2.0).as_dvec3())
     };
     let mut placed: Vec<Placed> = (0..40)
-        .map(|i| Placed { world_from_surface: Some(place(i)), cull_back: i % 3 == 0, ..Placed::default() })
+        .map(|i| Placed {
+            world_from_surface: Some(place(i)),
+            cull_back: i.is_multiple_of(3),
+            ..Placed::default()
+        })
         .collect();
     let mut worlds = KINDS.map(|k| World::new(k, &[surface], &placed, 2));
     placed[7].world_from_surface = None;
@@ -320,7 +324,7 @@ fn packets_answer_as_single_rays() {
             })
             .collect();
         for world in [&alone, &two] {
-            let accept = |i: usize, h: &Hit<f32>| (h.triangle as usize + i) % 7 > 0;
+            let accept = |i: usize, h: &Hit<f32>| !(h.triangle as usize + i).is_multiple_of(7);
             let want = |(i, r): (usize, &Ray<f32>)| (world.blocked(r, |h| accept(i, h)) as u32) << i;
             let want: u32 = rays.iter().enumerate().map(want).sum();
             assert_eq!(world.blocked_packet(&rays, accept), want, "{rays:?}");

@@ -170,7 +170,7 @@ impl Tracer {
         Self { isa, ..Self::default() }
     }
 
-    /// Draw this part of pictures alone, as [`Rasterizer::set_window`](super::raster::Rasterizer::set_window) does.
+    /// Draw this part of pictures alone, as [`Painter::set_window`](super::Painter::set_window) does.
     pub fn set_window(&mut self, window: Option<Window>) {
         self.window = window;
     }
@@ -218,8 +218,9 @@ impl Tracer {
         outcome
     }
 
-    /// Draw what the pixels show beside their colour, as [`Rasterizer::draw_channels`](super::raster::Rasterizer::draw_channels)
-    /// does, by its samples; shapes are numbered after the scene's objects.
+    /// Draw what the pixels show beside their colour, as [`Painter::draw_channels`](super::Painter::draw_channels)
+    /// does: where a picture by `ray` has its samples, 64 at most, or by the rasterizer's samples where it has one. Shapes are numbered
+    /// after the scene's objects.
     ///
     /// # Panics
     /// If `settings` do not pass [`Settings::check`].
@@ -227,6 +228,7 @@ impl Tracer {
         &mut self,
         scene: &Scene,
         settings: &Settings,
+        ray: &RaySettings,
         wanted: &[Channel],
         out: &mut Channels,
     ) {
@@ -235,7 +237,7 @@ impl Tracer {
         let world = follow(&mut self.world, &bodies, settings.threads.max(1));
         let size = [settings.width, settings.height];
         let stage = Stage::<f32>::of_scene(self.isa, scene, bodies, world, size);
-        tell::tell(&stage, scene, settings, window, wanted, out);
+        tell::tell(&stage, scene, settings, ray, window, wanted, out);
     }
 
     /// Draw the notes' scenes.

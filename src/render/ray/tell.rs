@@ -1,9 +1,10 @@
 //! What pixels show beside their colour.
 
-use super::ShapeCast;
 use super::coat::{self, Batch};
+use super::sampler;
 use super::stage::{Hit, Real, Stage};
 use super::wave::Path;
+use super::{RaySettings, ShapeCast};
 use crate::math::simd::F8;
 use crate::render::channel::{Channel, Channels};
 use crate::render::{ROTATED, Settings, Window};
@@ -28,6 +29,9 @@ pub(super) fn cast<R: Real>(stage: &Stage<R>, window: Window, focal: f64, out: &
         out.normals[at] = stage.spot(&path, &hit).face;
     }
 }
+
+/// Samples that are looked at, of many.
+const MOST: u32 = 64;
 
 /// Samples of a pixel that show one triangle, or one solid.
 #[derive(Clone, Copy)]
@@ -85,16 +89,25 @@ pub(super) fn tell<R: Real>(
     stage: &Stage<R>,
     scene: &Scene,
     settings: &Settings,
+    ray: &RaySettings,
     window: Window,
     wanted: &[Channel],
     out: &mut Channels,
 ) {
     out.reset(window.width, window.height, wanted);
     let rotated = ROTATED.map(|o| o.map(|c| f64::from(c) / 256.0));
-    let offsets = if settings.samples == 1 { &[[0.0; 2]][..] } else { &rotated };
+    let fixed = if settings.samples == 1 { &[[0.0; 2]][..] } else { &rotated };
+    // A picture of several samples is looked at where they lie, so that both cover the same.
+    let lie = |[x, y]: [usize; 2]| {
+        let sample = |i| sampler::sample(ray.seed, [x as u32, y as u32], i, 0).map(|c| c - 0.5);
+        (0..ray.samples.min(MOST)).map(sample).collect::<Vec<_>>()
+    };
     let mut entries = Vec::new();
     for at in 0..window.width * window.height {
-        let middle = [window.x + at % window.width, window.y + at / window.width].map(|x| x as f64 + 0.5);
+        let place = [window.x + at % window.width, window.y + at / window.width];
+        let lying = if ray.samples > 1 { lie(place) } else { Vec::new() };
+        let offsets = if ray.samples > 1 { &lying } else { fixed };
+        let middle = place.map(|x| x as f64 + 0.5);
         let Some((distance, found)) = pixel(stage, middle, at as u32, offsets) else { continue };
         out.objects[at] = found[0].hit.object + 1;
         if let Some(depth) = out.depth.get_mut(at) {
