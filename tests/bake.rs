@@ -1,7 +1,7 @@
 //! Baking: bounds that hold, steps that stay steps, files that stay whole.
 
 use glam::{Quat, Vec3};
-use sinew::bake::{BakeDesc, BakeError, Gauge, Metric, bake};
+use sinew::bake::{BakeDesc, BakeError, Gauge, Metric, bake, edit};
 use sinew::character::{Binding, Character, Instance, MeshId};
 use sinew::clip::{Clip, Curve, Interpolation, Target, Track};
 use sinew::fk;
@@ -196,4 +196,27 @@ fn a_file_with_other_clips_keeps_everything_else() {
     let again = gltf::import_bytes(&out.glb(), None, "out.glb", &Options::default()).unwrap();
     assert!(again.warnings.is_empty(), "{:?}", again.warnings);
     assert_eq!(again.asset.character.clips()[0], baked.clip);
+}
+
+#[test]
+fn joined_and_turned_clips_are_baked_as_well_as_others() {
+    let (character, bones) = arm();
+    let clip = swing(&bones);
+    let alone = bake(&character, &clip, &desc(1e-2)).unwrap().report;
+    // The joint is a jump: the arm is elsewhere at the end than at the start.
+    let twice = edit::concat("twice", &[&clip, &clip]);
+    let report = bake(&character, &twice, &desc(1e-2)).unwrap().report;
+    assert!(report.keys[1] < 2 * alone.keys[1] + 12, "{report:?} {alone:?}");
+
+    let hold = Curve::new(
+        vec![0.5, 1.0],
+        [0.0, 1.0].map(|a: f32| Quat::from_rotation_z(a).to_array()).concat(),
+        4,
+        Interpolation::Hold,
+    );
+    let steps = Clip {
+        name: "steps".into(),
+        tracks: vec![Track { target: Target::Rotation(bones[0]), curve: hold.unwrap() }],
+    };
+    assert_eq!(edit::reverse(&steps).playback(), steps.playback());
 }

@@ -275,8 +275,12 @@ fn channels_of_shards_are_those_of_the_whole() {
     let manifest = path(&dir, "all.json");
     run([args("w.#.png"), vec!["--manifest".into(), manifest.clone(), "--threads".into(), "1".into()]]
         .concat());
-    run([args("s.#.png"), vec!["--shard".into(), "1/2".into()]].concat());
-    run([args("s.#.png"), vec!["--shard".into(), "2/2".into()]].concat());
+    let parts = ["1/2", "2/2"].map(|shard| {
+        let part = path(&dir, &format!("part{}.json", &shard[..1]));
+        let shard = ["--shard", shard, "--manifest", &part].map(String::from).to_vec();
+        run([args("s.#.png"), shard].concat());
+        part
+    });
     let bytes = |name: String| std::fs::read(path(&dir, &name)).unwrap();
     for (n, kind) in (1..5).flat_map(|n| ["", ".depth", ".position"].map(|k| (n, k))) {
         assert!(bytes(format!("w.{n}{kind}.png")) == bytes(format!("s.{n}{kind}.png")), "{n}{kind}");
@@ -284,6 +288,14 @@ fn channels_of_shards_are_those_of_the_whole() {
     let list = text(&bytes("all.json".into()));
     assert!(list.contains("w.3.position.png"), "{list}");
     assert!(sinew(&["manifest", "check", &manifest]).status.success());
+
+    // The united manifest knows every file, and what is gone is drawn again.
+    let united = path(&dir, "united.json");
+    run(["manifest", "merge", &parts[0], &parts[1], "-o", &united].map(String::from).to_vec());
+    std::fs::remove_file(path(&dir, "s.2.depth.png")).unwrap();
+    assert_eq!(sinew(&["manifest", "check", &united]).status.code(), Some(4));
+    run([args("s.#.png"), vec!["--skip-existing".into()]].concat());
+    assert!(sinew(&["manifest", "check", &united]).status.success());
 }
 
 fn shipped(name: &str) -> String {

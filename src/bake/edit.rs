@@ -27,7 +27,7 @@ pub fn trim(clip: &Clip, range: Range) -> Clip {
 /// Backwards: what was at the end of the clip is at its start.
 pub fn reverse(clip: &Clip) -> Clip {
     let range = clip.playback();
-    each(clip, |keys| keys.reversed(range))
+    each(clip, |keys| keys.reversed(range).held_until(range.end))
 }
 
 /// Faster by `factor`: 2 lasts half as long.
@@ -171,20 +171,26 @@ impl Keys {
         if a.interpolation != b.interpolation {
             (a, b) = (a.cubic(), b.cubic());
         }
-        let (each, w, gap) = (a.each(), a.width, b.times[0] > a.times[a.times.len() - 1]);
-        if gap && a.interpolation != Interpolation::Hold {
-            let mut last = a.values[a.values.len() - each..].to_vec();
-            if a.interpolation == Interpolation::Hermite {
-                let n = a.values.len();
-                a.values[n - w..].fill(0.0);
-                (0..w).for_each(|c| (last[c], last[2 * w + c]) = (0.0, 0.0));
-            }
-            a.times.push(b.times[0]);
-            a.values.extend(last);
-        }
+        a = a.held_until(b.times[0]);
         a.times.append(&mut b.times);
         a.values.append(&mut b.values);
         a
+    }
+
+    /// With a key that says that the last value holds until `t`.
+    fn held_until(mut self, t: f64) -> Self {
+        let (each, w, n) = (self.each(), self.width, self.values.len());
+        if t <= self.times[self.times.len() - 1] {
+            return self;
+        }
+        let mut last = self.values[n - each..].to_vec();
+        if self.interpolation == Interpolation::Hermite {
+            self.values[n - w..].fill(0.0);
+            (0..w).for_each(|c| (last[c], last[2 * w + c]) = (0.0, 0.0));
+        }
+        self.times.push(t);
+        self.values.extend(last);
+        self
     }
 
     /// Steps as straight pieces: two keys at each time of a step.

@@ -35,15 +35,23 @@ impl Samples {
     pub fn of(curve: &Curve, kind: Kind) -> Self {
         let keys = curve.times();
         let mut out = Self { kind, width: curve.width(), times: vec![], values: vec![], own: vec![] };
+        let held = curve.interpolation() == Interpolation::Hold;
         for (k, &t) in keys.iter().enumerate() {
-            if k > 0 && keys[k - 1] == t {
+            // Of keys at one time the last holds; elsewhere the curve arrives at one and leaves from another.
+            if held && keys.get(k + 1) == Some(&t) {
                 continue;
             }
-            if k > 0 {
-                out.between(curve, keys[k - 1], t);
+            let before = out.times.last().copied();
+            if let Some(before) = before.filter(|&b| b < t) {
+                out.between(curve, before, t);
             }
             out.own.push(out.times.len());
-            out.push(curve, t);
+            out.times.push(t);
+            let value = curve.value(k);
+            match kind {
+                Kind::Rotation => out.values.extend(rotation::unit(Quat::from_slice(value)).to_array()),
+                _ => out.values.extend(value),
+            }
         }
         out.align();
         out

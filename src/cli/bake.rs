@@ -42,13 +42,13 @@ pub struct Args {
     #[arg(long, value_name = "NAME|INDEX")]
     clip: Option<String>,
     /// Only this part of each clip, in seconds; either end may be left out.
-    #[arg(long, value_name = "FROM..TO", value_parser = part)]
+    #[arg(long, value_name = "FROM..TO", value_parser = part, allow_hyphen_values = true)]
     trim: Option<[Option<f64>; 2]>,
     /// Turn the clips round.
     #[arg(long)]
     reverse: bool,
     /// Play faster: 2 lasts half as long.
-    #[arg(long, value_name = "FACTOR", value_parser = factor)]
+    #[arg(long, value_name = "FACTOR", value_parser = factor, allow_hyphen_values = true)]
     speed: Option<f64>,
     /// Join the clips into one of this name.
     #[arg(long, value_name = "NAME", conflicts_with = "clip")]
@@ -101,8 +101,8 @@ fn part(text: &str) -> Result<[Option<f64>; 2], String> {
 fn factor(text: &str) -> Result<f64, String> {
     text.parse::<f64>()
         .ok()
-        .filter(|f| *f > 0.0 && f.is_finite())
-        .ok_or_else(|| "expected a number above 0, as in 2 or 0.5".into())
+        .filter(|f| (1e-3..=1e3).contains(f))
+        .ok_or_else(|| "expected a number from 0.001 to 1000, as in 2 or 0.5".into())
 }
 
 /// The clips as they are to be baked, and which of the file's each takes the place of.
@@ -155,7 +155,26 @@ fn pin(text: &str) -> Result<(String, f64), String> {
     pin.ok_or_else(|| "expected a bone and a length, as in LeftFoot=0.01mm".into())
 }
 
+/// Say so before the work and not after it.
+fn check_output(args: &Args) -> Result<(), Failure> {
+    let name = args.output.display();
+    let known =
+        args.output.extension().is_some_and(|e| ["glb", "gltf"].iter().any(|k| e.eq_ignore_ascii_case(k)));
+    if !known {
+        return Err(Failure::Usage(format!("-o {name}: expected a name that ends in .glb or .gltf")));
+    }
+    if args.output.exists() && !args.force {
+        return Err(Failure::Run(format!("{name}: the file exists; --force overwrites it")));
+    }
+    let folder = args.output.parent().filter(|p| !p.as_os_str().is_empty());
+    match folder.filter(|f| !f.is_dir()) {
+        Some(folder) => Err(Failure::Run(format!("{name}: there is no folder {}", folder.display()))),
+        None => Ok(()),
+    }
+}
+
 pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
+    check_output(args)?;
     let import = load(&args.input, Options::default(), say)?;
     if import.format != "glTF" {
         let message =

@@ -10,6 +10,7 @@ mod say;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use say::Say;
+use sinew::io::scene::{Setting, ours};
 use sinew::io::{self, Import, Options};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -186,9 +187,17 @@ fn load_posed(path: &Path, poses: Option<&PathBuf>, options: Options, say: &Say)
     Ok(import)
 }
 
-/// The clip that `--clip` names: by name, else by index; the first by default, `None` without clips.
+/// The clip that `--clip` names: by name, else by index; by default a scene's own, else the first, `None` without clips.
 fn find_clip(import: &Import, asked: Option<&str>) -> Result<Option<usize>, Failure> {
     let clips = import.asset.character.clips();
+    let of_scene = match &import.setting {
+        Some(Setting::Ours(scene)) => scene.clip.as_ref().map(|c| match c {
+            ours::Clip::Name(name) => name.clone(),
+            ours::Clip::Index(i) => i.to_string(),
+        }),
+        _ => None,
+    };
+    let asked = asked.or(of_scene.as_deref());
     let Some(asked) = asked else { return Ok((!clips.is_empty()).then_some(0)) };
     let named = clips.iter().position(|c| c.name == asked);
     let index = asked.parse::<usize>().ok().filter(|&i| i < clips.len());

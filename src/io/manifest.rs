@@ -288,6 +288,15 @@ impl Output {
             };
         }
         self.frames = frames.into_values().collect();
+        let mut beside: std::collections::BTreeMap<PathBuf, String> =
+            std::mem::take(&mut self.beside).into_iter().map(|f| (f.file, f.sha256)).collect();
+        for FileEntry { file, sha256 } in theirs.beside {
+            match beside.get(&file) {
+                Some(ours) if *ours != sha256 => return conflict(&file, &Some(ours.clone()), &Some(sha256)),
+                _ => beside.insert(file, sha256),
+            };
+        }
+        self.beside = beside.into_iter().map(|(file, sha256)| FileEntry { file, sha256 }).collect();
         Ok(())
     }
 }

@@ -153,7 +153,10 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
     let bare = character.instances().iter().all(|i| character.mesh(i).triangles.is_empty());
     let props = scene.map(props).unwrap_or_default();
     if bare && overlays.is_empty() && props.shapes.is_empty() {
-        say.warn(&format!("{}: there are no triangles; the picture will be empty", task.input.display()));
+        say.warn(&format!(
+            "{}: there are no triangles; the picture will be empty (--bones draws the skeleton)",
+            task.input.display()
+        ));
     }
 
     let range = task.clip.map_or(Range::default(), |c| character.clips()[c].playback());
@@ -218,8 +221,8 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         target: task.target,
         level: args.output.png,
         threads,
-        // A sheet of which a part is there already is drawn again as a whole.
-        force: args.output.force || (one_picture && args.batch.skip_existing),
+        // What is complete was skipped; a sheet or a frame of which a part is there already is drawn again as a whole.
+        force: args.output.force || args.batch.skip_existing,
         hash: args.batch.manifest.is_some(),
         beside,
         budget: args.renderer.budget,
@@ -249,6 +252,13 @@ fn say_samples(args: &Args, written: &Written, pixels: usize, say: &Say) {
     let ended = args.renderer.ends_early() || say.verbose;
     if let Some(samples) = renderer::reached(&written.drawn.rays, pixels).filter(|_| ended) {
         say.note(&samples);
+    }
+    // One sample a pixel is the least that is a picture.
+    let (took, asked) = (written.drawn.times.draw, args.renderer.budget);
+    if let Some(asked) = asked.filter(|&a| took > a.mul_f64(1.5) && written.drawn.rays.samples <= 1) {
+        say.warn(&format!(
+            "--budget {asked:?}: one sample a pixel took {took:.1?}; a smaller --size takes less"
+        ));
     }
 }
 

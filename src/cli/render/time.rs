@@ -3,7 +3,6 @@
 use crate::cli::{Failure, find_clip};
 use sinew::frames::Moment;
 use sinew::io::Import;
-use sinew::io::scene::ours::Clip;
 use sinew::time::{FrameSet, Range, Rate, Wrap, frame_count, frame_time};
 use std::path::{Path, PathBuf};
 
@@ -46,12 +45,7 @@ pub struct Frame {
 impl TimeArgs {
     /// The clip that is asked for.
     pub fn clip(&self, import: &Import) -> Result<Option<usize>, Failure> {
-        let of_scene = super::scene(import).and_then(|s| s.clip.as_ref()).map(|c| match c {
-            Clip::Name(name) => name.clone(),
-            Clip::Index(i) => i.to_string(),
-        });
-        let asked = self.clip.as_deref().or(of_scene.as_deref());
-        if self.rest { Ok(None) } else { find_clip(import, asked) }
+        if self.rest { Ok(None) } else { find_clip(import, self.clip.as_deref()) }
     }
 
     /// The frames to be drawn; `alone` if one picture is wanted where nothing says which, of a moment that the scene may say; `lap` if the camera walks around in

@@ -70,9 +70,11 @@ pub fn with_clips(
     let asset =
         out.json["asset"].as_object_mut().ok_or_else(|| value("asset", "an object", "something else"))?;
     asset.insert("generator".into(), concat!("sinew ", env!("CARGO_PKG_VERSION")).into());
-    if let Some(map) = asset.entry("extras").or_insert(json!({})).as_object_mut() {
-        map.extend(extras);
+    let kept = asset.entry("extras").or_insert(json!({}));
+    if !kept.is_object() {
+        *kept = json!({"before": kept.take()});
     }
+    kept.as_object_mut().expect("just made").extend(extras);
     Ok(out)
 }
 
