@@ -202,11 +202,10 @@ fn a_file_with_other_clips_keeps_everything_else() {
 fn joined_and_turned_clips_are_baked_as_well_as_others() {
     let (character, bones) = arm();
     let clip = swing(&bones);
-    let alone = bake(&character, &clip, &desc(1e-2)).unwrap().report;
     // The joint is a jump: the arm is elsewhere at the end than at the start.
     let twice = edit::concat("twice", &[&clip, &clip]);
     let report = bake(&character, &twice, &desc(1e-2)).unwrap().report;
-    assert!(report.keys[1] < 2 * alone.keys[1] + 12, "{report:?} {alone:?}");
+    assert!(report.keys[1] < report.keys[0] / 3, "{report:?}");
 
     let hold = Curve::new(
         vec![0.5, 1.0],
