@@ -298,6 +298,36 @@ fn channels_of_shards_are_those_of_the_whole() {
     assert!(sinew(&["manifest", "check", &united]).status.success());
 }
 
+#[test]
+fn a_scene_without_a_camera_holds_its_shapes() {
+    let (dir, _) = folder();
+    for center in ["[0, 0, 0]", "[30, -2, 5]"] {
+        let (scene, out) = (path(&dir, "ball.json"), path(&dir, "ball.png"));
+        let text =
+            format!(r#"{{"sinew_scene": 1, "shapes": [{{"sphere": {{"center": {center}, "radius": 1}}}}]}}"#);
+        std::fs::write(&scene, text).unwrap();
+        does(&[
+            "render",
+            &scene,
+            "-o",
+            &out,
+            "-f",
+            "--size",
+            "64",
+            "--samples",
+            "1",
+            "--background",
+            "transparent",
+        ]);
+        let bytes = std::fs::read(&out).unwrap();
+        let first = sinew::io::picture::frames_of(&bytes).unwrap().next().unwrap().unwrap();
+        let picture = first.pixels.into_codes();
+        let covered = picture.data.iter().skip(3).step_by(4).filter(|a| **a > 0).count();
+        // A ball that fills most of the picture without touching its edge.
+        assert!((64 * 64 / 3..64 * 64 * 8 / 10).contains(&covered), "{center}: {covered}");
+    }
+}
+
 fn shipped(name: &str) -> String {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("rigs/scenes").join(name);
     file.to_str().expect("UTF-8").into()

@@ -179,6 +179,11 @@ fn load_posed(path: &Path, poses: Option<&PathBuf>, options: Options, say: &Say)
     if let Some(file) = poses {
         let bad = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", file.display()));
         let bytes = io::read_file(file).map_err(|e| bad(&e))?;
+        if bytes.trim_ascii_start().get(..9).is_some_and(|w| w.eq_ignore_ascii_case(b"HIERARCHY")) {
+            return Err(bad(
+                &"a motion capture stands on a skeleton of its own; expected poses (`sinew_poses`)",
+            ));
+        }
         let clips = io::rig_json::poses_from_bytes(&bytes, import.asset.character.skeleton());
         let clips = clips.map_err(|e| bad(&e))?;
         let character = std::mem::take(&mut import.asset.character);

@@ -16,6 +16,8 @@ pub(super) struct Span<'a> {
     pub clip: Option<usize>,
     /// The world point that the scene has its origin at.
     pub center: DVec3,
+    /// A box around the shapes in it, as far as they end.
+    pub shapes: Option<[Vec3; 2]>,
 }
 
 impl Span<'_> {
@@ -54,7 +56,7 @@ const PARALLEL: usize = 1 << 20;
 /// Show `see` the vertices of every mesh at moments of the whole clip, as seen by a camera that follows `anchor`: a bone,
 /// and where it stands in the world when the camera does not move.
 ///
-/// Where there is no triangle, the bones' ends stand for the meshes.
+/// Where there is no triangle, the bones' ends stand for the meshes; where there is no bone either, the shapes do.
 pub(super) fn each_moment(
     span: &Span,
     anchor: Option<(BoneId, DVec3)>,
@@ -81,6 +83,10 @@ pub(super) fn each_moment(
             for bone in skeleton.ids() {
                 let m = posed.near(bone, center);
                 points.extend([m.translation.into(), m.transform_point3(skeleton.tip(bone))]);
+            }
+            if let Some(ends) = span.shapes.filter(|_| points.is_empty()) {
+                let end = |corner: usize, axis: usize| ends[corner >> axis & 1][axis];
+                points.extend((0..8).map(|k| Vec3::new(end(k, 0), end(k, 1), end(k, 2))));
             }
             see(&points);
         }

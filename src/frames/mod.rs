@@ -199,9 +199,9 @@ impl<'a> Shot<'a> {
         let mut worker = Worker::default();
         worker.evaluate(asset, desc.clip, range.start);
         let center = asset.character.center(&worker.posed);
-        let span = Span { asset, clip: desc.clip, center };
         let placed = |s: &Shape| Shape { geometry: s.geometry.moved(-center), material: own + s.material };
-        let shapes = desc.props.shapes.iter().map(placed).collect();
+        let shapes: Vec<Shape> = desc.props.shapes.iter().map(placed).collect();
+        let span = Span { asset, clip: desc.clip, center, shapes: Shape::bounds(&shapes) };
         let stand = Stand::new(&span, &desc.view, desc.framing, aspect, &mut worker)?;
         let stage = Stage::new(&span, &desc.look, &materials, &mut worker);
         let layers = Layers::new(&span, &desc.overlays, &mut worker)?;

@@ -370,6 +370,14 @@ pub(super) fn patch(i: usize, doc: &MaterialDoc) -> Result<MaterialPatch, LookEr
     let color = |field: &str, c: &Option<Color>| {
         c.as_ref().map(|c| light(&format!("{place}.{field}"), c)).transpose()
     };
+    // What comes back is no more than what arrives.
+    let share = |field: &str, c: &Option<Color>| match color(field, c)? {
+        Some(v) if v.max_element() > 1.0 => {
+            let why = format!("`{field}` must be at most 1 in every channel, found {}", v.max_element());
+            Err(LookError::value(&place, why))
+        }
+        v => Ok(v),
+    };
     let bounded =
         |field: &str, v: Option<f32>, high: f32| v.map(|v| number(&place, field, v, 0.0, high)).transpose();
     // Alpha may stand in the colour, as in a rig.
@@ -391,8 +399,8 @@ pub(super) fn patch(i: usize, doc: &MaterialDoc) -> Result<MaterialPatch, LookEr
         double_sided: doc.double_sided,
         textures: doc.textures,
         ambient: color("ambient", &doc.ambient)?,
-        mirror: color("mirror", &doc.mirror)?,
-        transmission: color("transmission", &doc.transmission)?,
+        mirror: share("mirror", &doc.mirror)?,
+        transmission: share("transmission", &doc.transmission)?,
         ior: doc.ior.map(|v| number(&place, "ior", v, 0.1, 10.0)).transpose()?,
     })
 }

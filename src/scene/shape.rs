@@ -43,6 +43,19 @@ pub struct Shape {
     pub material: usize,
 }
 
+impl Shape {
+    /// Corners of a box around the shapes that have an end; none where none has.
+    pub fn bounds(shapes: &[Self]) -> Option<[Vec3; 2]> {
+        let ends = |s: &Self| match s.geometry {
+            Geometry::Sphere { center, radius } => Some([center - radius, center + radius]),
+            Geometry::Plane { .. } => None,
+            Geometry::Triangle([a, b, c]) => Some([a.min(b).min(c), a.max(b).max(c)]),
+        };
+        let all = shapes.iter().filter_map(ends).reduce(|[l, h], [low, high]| [l.min(low), h.max(high)]);
+        all.map(|ends| ends.map(|e| e.as_vec3()))
+    }
+}
+
 /// A camera of the notes (§2.3–2.6): pixel `(i, j)` of `nx × ny`, counted from the top left, looks from `eye` along
 /// `u·(W(i+½)/nx − W/2) + v·(H/2 − H(j+½)/ny) − w·d`. That direction is not normalised: at `t = 1` a ray is on the sensor, and
 /// what is nearer than that is not seen.

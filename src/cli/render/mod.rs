@@ -207,7 +207,11 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
     let transparent = look::transparent(&desc.look) || args.sheet.is_transparent();
     let start = Instant::now();
     let desc = args.sheet.desc(desc, asset);
-    let shot = Shot::new(asset, desc).map_err(|e| Failure::Usage(e.to_string()))?;
+    let of_file = args.camera.is_default() && scene.is_some_and(|s| s.camera.is_some());
+    let shot = Shot::new(asset, desc).map_err(|e| match of_file {
+        true => Failure::Input(format!("{}: camera: {e}", task.input.display())),
+        false => Failure::Usage(e.to_string()),
+    })?;
     totals.framing += start.elapsed();
     let moments = args.sheet.contact_frames(&shot);
     let bones = character.skeleton();

@@ -243,7 +243,8 @@ fn shape(place: &str, doc: &ShapeDoc, materials: &[Material]) -> Result<Shape, S
         None => materials.len(),
         Some(name) => materials.iter().position(|m| m.name == *name).ok_or_else(|| {
             let names: Vec<&str> = materials.iter().map(|m| m.name.as_str()).collect();
-            let why = format!("no material is called `{name}`; `materials` has: {}", names.join(", "));
+            let has = if names.is_empty() { "none".into() } else { names.join(", ") };
+            let why = format!("no material is called `{name}`; `materials` has: {has}");
             SceneError::value(place, why)
         })?,
     };
