@@ -336,11 +336,5 @@ fn packets_answer_as_single_rays() {
 
 #[test]
 fn no_ray_gets_out_of_a_closed_surface() {
-    assert_eq!((escapes::<f32>(100_000), escapes::<f64>(20_000)), (0, 0));
-}
-
-#[test]
-#[ignore = "takes a minute"]
-fn none_of_ten_million_rays_gets_out() {
-    assert_eq!(escapes::<f32>(10_000_000), 0);
+    assert_eq!((escapes::<f32>(10_000_000), escapes::<f64>(20_000)), (0, 0));
 }
