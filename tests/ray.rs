@@ -307,7 +307,11 @@ mod characters {
                 let what = format!("{}, {clip:?}, {time} s", file.display());
                 let rays = Renderer::Ray(RaySettings { shadows: false, ..Default::default() });
                 let by = |renderer| draw(&import, clip, time, renderer);
-                compare(&what, &by(Renderer::Raster), &by(rays));
+                let raster = by(Renderer::Raster);
+                compare(&what, &raster, &by(rays), 2);
+                // Where both see the same triangles there are no exceptions.
+                let seen = Renderer::Hybrid(RaySettings { shadows: false, ..Default::default() });
+                compare(&what, &raster, &by(seen), 0);
             }
         }
     }
@@ -318,9 +322,9 @@ mod characters {
     }
 
     /// Off silhouettes, where a pixel's neighbours are something else or lie apart, pictures are the same to one code, depths to 1e-4.
-    /// In slivers the two find other mip levels, as the rasterizer pulls points in that its snapping has put outside: that is a pixel
-    /// or two.
-    fn compare(what: &str, a: &(Image, Channels), b: &(Image, Channels)) {
+    /// The rasterizer snaps corners to 1/256 pixel, so that beside an edge it may see the neighbour of the triangle that a ray meets, with
+    /// another mip level: `most` pixels may.
+    fn compare(what: &str, a: &(Image, Channels), b: &(Image, Channels), most: usize) {
         let apart = |c: &Channels, i: usize, j: usize| {
             let z = c.depth[i];
             j >= c.objects.len() || c.objects[j] != c.objects[i] || (c.depth[j] - z).abs() > 0.01 * z
@@ -336,7 +340,7 @@ mod characters {
             let (p, q) = (a.0.pixels[i], b.0.pixels[i]);
             slivers += usize::from((0..4).any(|c| (p[c] - q[c]).abs() > 1.0 / 255.0));
         }
-        assert!(slivers <= 2, "{what}: {slivers} pixels differ");
+        assert!(slivers <= most, "{what}: {slivers} pixels differ, expected {most} at most");
         assert!(compared > 300, "{what}: {compared} pixels");
     }
 }
