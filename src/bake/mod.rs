@@ -50,7 +50,8 @@ impl Default for BakeDesc {
 pub struct Report {
     /// The worst point that was found.
     pub worst: Worst,
-    /// No point is farther off than that share of what it may: the worst found, and what may hide between the moments looked at.
+    /// The worst share with what may hide between the moments looked at. An estimate from second differences around the worst moments, not
+    /// a proof.
     pub ceiling: f64,
     /// Moments at which all vertices were compared.
     pub moments: usize,

@@ -33,8 +33,7 @@ pub(super) fn coarse(clip: &Clip, most: usize) -> Vec<f64> {
     all.into_iter().step_by(step).collect()
 }
 
-/// Compare two clips everywhere: the worst that was found, a bound for what was not as a share of what is allowed, and the number of
-/// moments.
+/// Compare two clips: the worst that was found, an estimate of what was not as a share of what is allowed, and the number of moments.
 ///
 /// Between two knots the distance of a vertex is smooth. A maximum of a smooth curve that was sampled at distance `h` hides at most
 /// `h²/8` times its second derivative, which the samples' second differences estimate; twice that is added.
@@ -45,7 +44,7 @@ pub(super) fn verify(gauge: &Gauge, a: &Clip, b: &Clip) -> (Worst, f64, usize) {
     let worst = |list: &[Worst]| list.iter().copied().fold(Worst::default(), Worst::worse);
     let mut top = worst(&found);
 
-    // Halve the steps around the worst moments until nothing is gained.
+    // Look eight times as closely around the worst moments.
     let mut order: Vec<usize> = (0..found.len()).collect();
     order.sort_by(|&i, &j| found[j].share().total_cmp(&found[i].share()).then(i.cmp(&j)));
     order.truncate(CLOSER);
