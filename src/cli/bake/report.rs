@@ -1,0 +1,69 @@
+//! What was reached, for people and for programs.
+
+use crate::cli::say;
+use serde_json::{Value, json};
+use sinew::bake::{Baked, Metric, Spot};
+use sinew::clip::Clip;
+use sinew::io::Import;
+
+/// A clip, and what was made of it.
+pub(super) struct Done<'a> {
+    pub clip: &'a Clip,
+    pub replaces: Option<usize>,
+    pub baked: Baked,
+}
+
+pub(super) fn bone_of(import: &Import, b: &Baked) -> String {
+    let character = &import.asset.character;
+    let bone = match b.report.worst.spot {
+        Some(Spot::Vertex { instance, vertex }) => character.bones_of(instance, vertex).next(),
+        Some(Spot::Bone(bone)) => Some(bone),
+        None => None,
+    };
+    bone.map_or_else(String::new, |b| character.skeleton().name(b).into())
+}
+
+pub(super) fn line(import: &Import, done: &Done, diagonal: f64) -> String {
+    let (clip, r) = (done.clip, &done.baked.report);
+    format!(
+        "{}: {} → {} keys, {} → {} bytes; at most {:.4} mm off ({:.4}% of the diagonal), at {:.3} s on {}",
+        say::name(&clip.name),
+        r.keys[0],
+        r.keys[1],
+        r.bytes[0],
+        r.bytes[1],
+        1e3 * r.ceiling * r.worst.limit,
+        100.0 * r.ceiling * r.worst.limit / diagonal.max(1e-30),
+        r.worst.time,
+        say::name(&bone_of(import, &done.baked)),
+    )
+}
+
+pub(super) fn worst(import: &Import, b: &Baked) -> Value {
+    let mut worst = json!({"time": b.report.worst.time, "bone": bone_of(import, b)});
+    if let Some(Spot::Vertex { instance, vertex }) = b.report.worst.spot {
+        (worst["instance"], worst["vertex"]) = (instance.into(), vertex.into());
+    }
+    worst
+}
+
+pub(super) fn report(import: &Import, done: &[Done], metric: Metric, metres: f64, diagonal: f64) -> Value {
+    let metric_name = match metric {
+        Metric::Vertices => "vertices".to_owned(),
+        Metric::Shell(radius) => format!("shell of {radius} m"),
+    };
+    let clips = done.iter().map(|d| {
+        let (b, r) = (&d.baked, &d.baked.report);
+        json!({
+            "clip": d.clip.name,
+            "error": r.ceiling * r.worst.limit,
+            "measured": r.worst.distance,
+            "limit": r.worst.limit,
+            "worst": worst(import, b),
+            "moments": r.moments,
+            "keys": r.keys,
+            "bytes": r.bytes,
+        })
+    });
+    json!({"tolerance": metres, "diagonal": diagonal, "metric": metric_name, "clips": clips.collect::<Vec<_>>()})
+}
