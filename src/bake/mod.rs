@@ -5,6 +5,7 @@
 //! stays within what was asked for. What is promised was measured on the vertices, at keys, at frames and between them.
 
 mod bound;
+mod cubic;
 pub mod edit;
 mod fit;
 mod gauge;
@@ -38,14 +39,33 @@ pub struct BakeDesc {
     pub pins: Vec<(BoneId, f64)>,
     /// Rotations may be stored as normalised 16-bit integers, where the bound allows.
     pub quantize: bool,
+    /// What there is to be little of.
+    pub goal: Goal,
     /// Worker threads; the result does not depend on them.
     pub threads: usize,
+}
+
+/// What a bake makes little of: it decides between hold, linear, Catmull-Rom and cubic curves, track by track.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Goal {
+    /// Bytes of a glTF file, where a cubic key takes three values. Catmull-Rom curves have no place there.
+    #[default]
+    Bytes,
+    /// Keys, for people to edit.
+    Keys,
 }
 
 impl Default for BakeDesc {
     /// A millimetre, on the skin.
     fn default() -> Self {
-        Self { tolerance: 1e-3, metric: Metric::Vertices, pins: vec![], quantize: true, threads: 1 }
+        Self {
+            tolerance: 1e-3,
+            metric: Metric::Vertices,
+            pins: vec![],
+            quantize: true,
+            goal: Goal::Bytes,
+            threads: 1,
+        }
     }
 }
 
