@@ -8,10 +8,10 @@ use crate::clip::{Clip, Curve, Interpolation, Target, Track};
 use std::collections::BTreeSet;
 
 /// Moments at which levers are measured.
-const LEVER_MOMENTS: usize = 24;
+pub(super) const LEVER_MOMENTS: usize = 24;
 
 /// Moments at which the search compares vertices.
-const SEARCH_MOMENTS: usize = 400;
+pub(super) const SEARCH_MOMENTS: usize = 400;
 
 /// Vertices times moments that the search may compare in all.
 const SEARCH_WORK: usize = 400_000_000;
