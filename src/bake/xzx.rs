@@ -6,7 +6,8 @@
 //! ([`euler::nearest_xzx`]): each angle unwrapped on its own would turn a bone over where it passes its rest.
 
 use super::gauge::Gauge;
-use super::{BakeDesc, BakeError, Baked, Report, bake, check, plan, times};
+use super::times::{self, Verdict};
+use super::{BakeDesc, BakeError, Baked, Report, bake, check, plan};
 use crate::character::Character;
 use crate::clip::{Clip, Curve, Interpolation, Target, Track};
 use crate::math::{euler, rotation};
@@ -103,7 +104,7 @@ fn convert(character: &Character, clip: &Clip, desc: &BakeDesc, form: Form) -> R
             ..desc.clone()
         };
         let mut baked = bake(character, &path, &left)?;
-        let (worst, ceiling, moments) = times::verify(&gauge, clip, &baked.clip);
+        let Verdict { worst, ceiling, moments } = times::verify(&gauge, clip, &baked.clip);
         let keys = [clip.key_count(), baked.clip.key_count()];
         let bytes = [plan::bytes(clip, &[]), baked.report.bytes[1]];
         if ceiling <= 1.0 {
