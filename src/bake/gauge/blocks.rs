@@ -19,18 +19,21 @@ const ROUNDING: f32 = 1e-5;
 struct Block {
     center: Vec3A,
     half: Vec3A,
-    /// Places in `Skin::order`.
+    /// Places in the skin's lists.
     vertices: std::ops::Range<usize>,
     /// Palette entries that move any of them, each with its largest weight.
     bones: Vec<(u16, f32)>,
 }
 
 /// The vertices of one mesh instance.
-pub(super) struct Skin<'a> {
-    positions: &'a [Vec3],
-    weights: Option<&'a Weights>,
+pub(super) struct Skin {
     pub palette: Vec<(BoneId, Affine3A)>,
+    /// Vertices block by block: where they are at rest, their index, and what moves them.
+    points: Vec<Vec3A>,
     order: Vec<u32>,
+    influences: Vec<(u16, f32)>,
+    /// Influences a vertex.
+    width: usize,
     blocks: Vec<Block>,
 }
 
@@ -41,58 +44,37 @@ pub(super) struct Far {
     pub vertex: Option<u32>,
 }
 
-impl<'a> Skin<'a> {
-    pub fn new(character: &'a Character, instance: usize) -> Self {
+impl Skin {
+    pub fn new(character: &Character, instance: usize) -> Self {
         let inst = &character.instances()[instance];
         let positions = &character.mesh(inst).positions[..];
         let (palette, weights) = match &inst.binding {
             Binding::Bone(b) => (vec![(*b, Affine3A::IDENTITY)], None),
             Binding::Skin { palette, weights } => (palette.clone(), Some(weights)),
         };
-        let mut skin = Self { positions, weights, palette, order: vec![], blocks: vec![] };
         // Those of one strongest bone together, then halves along the longest side.
         let strongest = |v: u32| weights.and_then(|w| w.of(v as usize).next()).map_or(0, |b| b.0);
         let mut order: Vec<u32> = (0..positions.len() as u32).collect();
         order.sort_by_key(|&v| strongest(v));
+        let mut runs = vec![];
+        let mut start = 0;
         for run in order.chunk_by_mut(|a, b| strongest(*a) == strongest(*b)) {
-            skin.split(run);
+            split(positions, run, start, &mut runs);
+            start += run.len();
         }
-        skin
-    }
-
-    fn split(&mut self, run: &mut [u32]) {
-        let at = |v: u32| self.positions[v as usize];
-        let (lo, hi) = run
-            .iter()
-            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), &v| (lo.min(at(v)), hi.max(at(v))));
-        if run.len() > FULL {
-            let axis = (hi - lo).max_position();
-            let middle = run.len() / 2;
-            run.select_nth_unstable_by(middle, |&a, &b| at(a)[axis].total_cmp(&at(b)[axis]).then(a.cmp(&b)));
-            let (left, right) = run.split_at_mut(middle);
-            self.split(left);
-            return self.split(right);
-        }
-        let mut bones: Vec<(u16, f32)> = vec![];
-        for &v in run.iter() {
-            for (bone, w) in self.influences(v).filter(|i| i.1 > 0.0) {
-                match bones.iter_mut().find(|b| b.0 as usize == bone) {
-                    Some(known) => known.1 = known.1.max(w),
-                    None => bones.push((bone as u16, w)),
-                }
-            }
-        }
-        // A little wider, for the middle is rounded.
-        let half = Vec3A::from(0.5 * (hi - lo) + ROUNDING * lo.abs().max(hi.abs()));
-        let start = self.order.len();
-        self.order.extend_from_slice(run);
-        let center = Vec3A::from(0.5 * (lo + hi));
-        self.blocks.push(Block { center, half, vertices: start..self.order.len(), bones });
-    }
-
-    fn influences(&self, v: u32) -> impl Iterator<Item = (usize, f32)> + '_ {
-        let rigid = self.weights.is_none().then_some((0, 1.0));
-        rigid.into_iter().chain(self.weights.into_iter().flat_map(move |w| w.of(v as usize)))
+        let width = weights.map_or(1, Weights::per_vertex);
+        let of = |v: &u32| {
+            let rigid = weights.is_none().then_some((0, 1.0));
+            let skinned = weights.into_iter().flat_map(|w| w.of(*v as usize));
+            rigid.into_iter().chain(skinned.map(|(b, w)| (b as u16, w))).collect::<Vec<_>>()
+        };
+        let influences: Vec<(u16, f32)> = order.iter().flat_map(of).collect();
+        let points: Vec<Vec3A> = order.iter().map(|&v| positions[v as usize].into()).collect();
+        let blocks = runs
+            .into_iter()
+            .map(|r| Block::new(r.clone(), &points[r.clone()], &influences[r.start * width..r.end * width]));
+        let blocks = blocks.collect();
+        Self { palette, points, order, influences, width, blocks }
     }
 
     /// The vertex that a difference of palettes moves farthest, if farther than `far`. The first of equals.
@@ -122,20 +104,23 @@ impl<'a> Skin<'a> {
     }
 
     fn within(&self, block: &Block, delta: &[Affine3A], mut far: Far) -> Far {
-        for &v in &self.order[block.vertices.clone()] {
-            let p = Vec3A::from(self.positions[v as usize]);
-            let d = match self.weights {
-                None => delta[0].transform_point3a(p),
-                Some(w) => {
+        let w = self.width;
+        for i in block.vertices.clone() {
+            let influences = &self.influences[i * w..(i + 1) * w];
+            let d = match influences {
+                [(bone, 1.0), ..] => delta[*bone as usize].transform_point3a(self.points[i]),
+                _ => {
                     let mut m = Affine3A { matrix3: Mat3A::ZERO, translation: Vec3A::ZERO };
-                    for (bone, weight) in w.of(v as usize) {
-                        m.matrix3 += delta[bone].matrix3 * weight;
-                        m.translation += delta[bone].translation * weight;
+                    for &(bone, weight) in influences {
+                        let part = &delta[bone as usize];
+                        m.matrix3 += part.matrix3 * weight;
+                        m.translation += part.translation * weight;
                     }
-                    m.transform_point3a(p)
+                    m.transform_point3a(self.points[i])
                 }
             };
             let d2 = d.length_squared();
+            let v = self.order[i];
             let earlier = d2 == far.d2 && far.vertex.is_some_and(|known| v < known);
             if d2 > far.d2 || earlier {
                 far = Far { d2, vertex: Some(v) };
@@ -143,6 +128,22 @@ impl<'a> Skin<'a> {
         }
         far
     }
+}
+
+/// Runs of vertices that lie together; they are sorted so.
+fn split(positions: &[Vec3], run: &mut [u32], start: usize, out: &mut Vec<std::ops::Range<usize>>) {
+    if run.len() <= FULL {
+        return out.push(start..start + run.len());
+    }
+    let at = |v: u32| positions[v as usize];
+    let (lo, hi) =
+        run.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), &v| (lo.min(at(v)), hi.max(at(v))));
+    let axis = (hi - lo).max_position();
+    let middle = run.len() / 2;
+    run.select_nth_unstable_by(middle, |&a, &b| at(a)[axis].total_cmp(&at(b)[axis]).then(a.cmp(&b)));
+    let (left, right) = run.split_at_mut(middle);
+    split(positions, left, start, out);
+    split(positions, right, start + middle, out);
 }
 
 /// Whether a difference is any at all.
@@ -153,6 +154,21 @@ fn largest(m: &Affine3A) -> f32 {
 }
 
 impl Block {
+    fn new(vertices: std::ops::Range<usize>, points: &[Vec3A], influences: &[(u16, f32)]) -> Self {
+        let fold = |(lo, hi): (Vec3A, Vec3A), p: &Vec3A| (lo.min(*p), hi.max(*p));
+        let (lo, hi) = points.iter().fold((Vec3A::INFINITY, Vec3A::NEG_INFINITY), fold);
+        let mut bones: Vec<(u16, f32)> = vec![];
+        for &(bone, w) in influences.iter().filter(|i| i.1 > 0.0) {
+            match bones.iter_mut().find(|b| b.0 == bone) {
+                Some(known) => known.1 = known.1.max(w),
+                None => bones.push((bone, w)),
+            }
+        }
+        // A little wider, for the middle is rounded.
+        let half = 0.5 * (hi - lo) + ROUNDING * lo.abs().max(hi.abs());
+        Self { center: 0.5 * (lo + hi), half, vertices, bones }
+    }
+
     /// No vertex of the block goes farther: the square of that.
     fn bound(&self, delta: &[Affine3A], size: &[f32]) -> f32 {
         let (mut most, mut blend) = (0.0_f32, 0.0_f32);

@@ -96,15 +96,15 @@ pub struct Looks {
 
 /// Evaluates clips of one character.
 pub struct Gauge<'a> {
-    character: &'a Character,
+    pub(super) character: &'a Character,
     rest: Pose,
     threads: usize,
-    limit: f64,
-    metric: Metric,
-    pins: &'a [(BoneId, f64)],
+    pub(super) limit: f64,
+    pub(super) metric: Metric,
+    pub(super) pins: &'a [(BoneId, f64)],
     over: Option<&'a Pose>,
     watch: Option<Watch<'a>>,
-    skins: OnceLock<Vec<Skin<'a>>>,
+    skins: OnceLock<Vec<Skin>>,
 }
 
 impl<'a> Gauge<'a> {
@@ -223,6 +223,12 @@ impl<'a> Gauge<'a> {
         self.apart(0.0, &mut bench, Some(&first), 0.0)
     }
 
+    /// Work on every item, on all threads, results in order.
+    pub(super) fn map<S: Sync + Copy, T: Send>(&self, items: &[S], work: impl Fn(S) -> T + Sync) -> Vec<T> {
+        let parts = self.chunks(items.len(), |_, range| range.map(|i| work(items[i])).collect::<Vec<_>>());
+        parts.into_iter().flatten().collect()
+    }
+
     /// Work on all of `0..n` in parts, on all threads, results in order.
     fn chunks<T: Send>(&self, n: usize, work: impl Fn(&mut Bench, Range<usize>) -> T + Sync) -> Vec<T> {
         let threads = self.threads.min(n).max(1);
@@ -256,17 +262,27 @@ impl<'a> Gauge<'a> {
         out.into_iter().filter_map(|o| o.into_inner().expect("no thread is left")).collect()
     }
 
-    fn show(&self, clip: &Clip, t: f64, out: &mut Shown) {
-        let skeleton = self.character.skeleton();
+    /// The pose that a clip makes, over the base if it is additive.
+    pub(super) fn pose(&self, clip: &Clip, t: f64) -> Pose {
+        let mut pose = Pose::default();
+        self.pose_into(clip, t, &mut pose);
+        pose
+    }
+
+    fn pose_into(&self, clip: &Clip, t: f64, pose: &mut Pose) {
         match self.over {
-            Some(base) => out.pose = edit::added(base, clip, t),
+            Some(base) => *pose = edit::added(base, clip, t),
             None => {
-                out.pose.locals.clone_from(&self.rest.locals);
-                out.pose.weights.clone_from(&self.rest.weights);
-                clip.sample(skeleton, t, &mut out.pose);
+                pose.locals.clone_from(&self.rest.locals);
+                pose.weights.clone_from(&self.rest.weights);
+                clip.sample(self.character.skeleton(), t, pose);
             }
         }
-        fk::forward(skeleton, &out.pose, &mut out.posed);
+    }
+
+    fn show(&self, clip: &Clip, t: f64, out: &mut Shown) {
+        self.pose_into(clip, t, &mut out.pose);
+        fk::forward(self.character.skeleton(), &out.pose, &mut out.posed);
     }
 
     /// The worst point of a clip against what is shown; points that stray by no more than `floor` may be left out.
