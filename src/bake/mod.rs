@@ -7,10 +7,12 @@
 pub mod edit;
 mod fit;
 mod gauge;
+mod pack;
 mod plan;
 mod times;
 
 pub use gauge::{Gauge, Lever, Metric, Spot, Worst};
+pub use pack::{PackedBake, pack};
 
 use crate::character::Character;
 use crate::clip::Clip;
@@ -111,14 +113,7 @@ pub enum BakeError {
 /// # Panics
 /// If the clip is not of the character.
 pub fn bake(character: &Character, clip: &Clip, desc: &BakeDesc) -> Result<Baked, BakeError> {
-    let mut asked = std::iter::once(desc.tolerance).chain(desc.pins.iter().map(|p| p.1));
-    if let Some(found) = asked.find(|t| t.is_nan() || *t <= 0.0) {
-        return Err(BakeError::Tolerance { found });
-    }
-    let vertices = character.instances().iter().map(|i| character.mesh(i).positions.len()).sum::<usize>();
-    if vertices == 0 && desc.metric == Metric::Vertices {
-        return Err(BakeError::NoSkin);
-    }
+    check(character, desc)?;
     let gauge = Gauge::of(character, desc);
     let mut plan = Plan::new(character, clip, &gauge, desc);
     let mut baked = plan.search(&gauge);
@@ -142,4 +137,17 @@ pub fn bake(character: &Character, clip: &Clip, desc: &BakeDesc) -> Result<Baked
     let clip = clip.name.clone();
     let (tolerance, reached) = (worst.limit, ceiling * worst.limit);
     Err(BakeError::Missed { clip, tolerance, reached, time: worst.time })
+}
+
+/// Whether what is asked for means anything.
+fn check(character: &Character, desc: &BakeDesc) -> Result<(), BakeError> {
+    let mut asked = std::iter::once(desc.tolerance).chain(desc.pins.iter().map(|p| p.1));
+    if let Some(found) = asked.find(|t| t.is_nan() || *t <= 0.0) {
+        return Err(BakeError::Tolerance { found });
+    }
+    let vertices = character.instances().iter().map(|i| character.mesh(i).positions.len()).sum::<usize>();
+    if vertices == 0 && desc.metric == Metric::Vertices {
+        return Err(BakeError::NoSkin);
+    }
+    Ok(())
 }

@@ -1,8 +1,10 @@
 //! Clips: tracks of keys that turn a time into a pose.
 
 mod curve;
+pub(crate) mod packed;
 
 pub use curve::{Curve, CurveError, Interpolation};
+pub use packed::{Packed, PackedError};
 
 use crate::pose::Pose;
 use crate::skeleton::{BoneId, Skeleton};
