@@ -78,11 +78,11 @@ struct Bench {
 
 /// Evaluates clips of one character.
 pub struct Gauge<'a> {
-    character: &'a Character,
+    pub(super) character: &'a Character,
     threads: usize,
-    limit: f64,
-    metric: Metric,
-    pins: &'a [(BoneId, f64)],
+    pub(super) limit: f64,
+    pub(super) metric: Metric,
+    pub(super) pins: &'a [(BoneId, f64)],
 }
 
 impl<'a> Gauge<'a> {
@@ -122,11 +122,20 @@ impl<'a> Gauge<'a> {
         self.each(times, |bench, t| self.at(a, b, t, bench))
     }
 
-    /// Work on every time, on all threads, results in order.
-    fn each<T: Send + Default + Clone>(
+    /// Work on every item, on all threads, results in order.
+    pub(super) fn map<S: Sync + Copy, T: Send + Default + Clone>(
         &self,
-        times: &[f64],
-        work: impl Fn(&mut Bench, f64) -> T + Sync,
+        items: &[S],
+        work: impl Fn(S) -> T + Sync,
+    ) -> Vec<T> {
+        self.each(items, |_, item| work(item))
+    }
+
+    /// Work on every time, on all threads, results in order.
+    fn each<S: Sync + Copy, T: Send + Default + Clone>(
+        &self,
+        times: &[S],
+        work: impl Fn(&mut Bench, S) -> T + Sync,
     ) -> Vec<T> {
         let threads = self.threads.min(times.len()).max(1);
         let share = times.len().div_ceil(8 * threads).max(1);
@@ -155,7 +164,7 @@ impl<'a> Gauge<'a> {
         out
     }
 
-    fn pose(&self, clip: &Clip, t: f64) -> Pose {
+    pub(super) fn pose(&self, clip: &Clip, t: f64) -> Pose {
         let mut pose = self.character.rest_pose();
         clip.sample(self.character.skeleton(), t, &mut pose);
         pose

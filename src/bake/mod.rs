@@ -4,12 +4,17 @@
 //! distance to the farthest vertex that it moves. The shares are then grown together, and one by one, as long as the worst vertex
 //! stays within what was asked for. What is promised was measured on the vertices, at keys, at frames and between them.
 
+mod bound;
+mod cubic;
 pub mod edit;
 mod fit;
 mod gauge;
 mod pack;
 mod plan;
+#[cfg(test)]
+mod tests;
 mod times;
+pub mod xzx;
 
 pub use gauge::{Gauge, Lever, Metric, Spot, Worst};
 pub use pack::{PackedBake, pack};
@@ -18,6 +23,7 @@ use crate::character::Character;
 use crate::clip::Clip;
 use crate::skeleton::BoneId;
 use plan::Plan;
+use times::Verdict;
 
 /// How a clip is to be baked.
 ///
@@ -36,14 +42,33 @@ pub struct BakeDesc {
     pub pins: Vec<(BoneId, f64)>,
     /// Rotations may be stored as normalised 16-bit integers, where the bound allows.
     pub quantize: bool,
+    /// What there is to be little of.
+    pub goal: Goal,
     /// Worker threads; the result does not depend on them.
     pub threads: usize,
+}
+
+/// What a bake makes little of: it decides between hold, linear, Catmull-Rom and cubic curves, track by track.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Goal {
+    /// Bytes of a glTF file, where a cubic key takes three values. Catmull-Rom curves have no place there.
+    #[default]
+    Bytes,
+    /// Keys, for people to edit.
+    Keys,
 }
 
 impl Default for BakeDesc {
     /// A millimetre, on the skin.
     fn default() -> Self {
-        Self { tolerance: 1e-3, metric: Metric::Vertices, pins: vec![], quantize: true, threads: 1 }
+        Self {
+            tolerance: 1e-3,
+            metric: Metric::Vertices,
+            pins: vec![],
+            quantize: true,
+            goal: Goal::Bytes,
+            threads: 1,
+        }
     }
 }
 
@@ -52,8 +77,8 @@ impl Default for BakeDesc {
 pub struct Report {
     /// The worst point that was found.
     pub worst: Worst,
-    /// The worst share with what may hide between the moments looked at. An estimate from second differences around the worst moments, not
-    /// a proof.
+    /// What no point exceeds at any time, as a part of its limit: between the moments looked at, second derivatives of the bones' motion bound
+    /// what can hide. Rounding of single precision aside, the true maximum lies between `worst` and this.
     pub ceiling: f64,
     /// Moments at which all vertices were compared.
     pub moments: usize,
@@ -119,18 +144,19 @@ pub fn bake(character: &Character, clip: &Clip, desc: &BakeDesc) -> Result<Baked
     let mut baked = plan.search(&gauge);
     let mut share = 1.0;
     for _ in 0..8 {
-        let (worst, ceiling, moments) = times::verify(&gauge, clip, &baked.clip);
+        let Verdict { worst, ceiling, moments } = times::verify(&gauge, clip, &baked.clip);
         let report = &mut baked.report;
         (report.worst, report.ceiling, report.moments) = (worst, ceiling, moments);
         if ceiling <= 1.0 {
             return Ok(baked);
         }
         // What hid between the moments of the search: aim a little lower.
-        share *= (0.95 / ceiling).min(0.9);
+        let over = if worst.share() > 1.0 { worst.share() } else { ceiling };
+        share *= (0.95 / over).min(0.9);
         baked = plan.within(share);
     }
     let plain = plan.untouched();
-    let (worst, ceiling, moments) = times::verify(&gauge, clip, &plain.clip);
+    let Verdict { worst, ceiling, moments } = times::verify(&gauge, clip, &plain.clip);
     if ceiling <= 1.0 {
         return Ok(Baked { report: Report { worst, ceiling, moments, ..plain.report }, ..plain });
     }

@@ -36,15 +36,17 @@ pub fn pack(character: &Character, clip: &Clip, desc: &BakeDesc) -> Result<Packe
     let mut found = 0.0;
     for _ in 0..12 {
         let Some(packed) = search.packed() else { break };
-        let (ceiling, moments);
-        (worst, ceiling, moments) = times::verify(&gauge, clip, &packed.to_clip(&clip.name));
+        let verdict = times::verify(&gauge, clip, &packed.to_clip(&clip.name));
+        let (ceiling, moments) = (verdict.ceiling, verdict.moments);
+        worst = verdict.worst;
         if ceiling <= 1.0 {
             let keys = [clip.key_count(), search.numbers()];
             let bytes = [plan::bytes(clip, &[]), packed.bytes().len()];
             return Ok(PackedBake { packed, report: Report { worst, ceiling, moments, keys, bytes } });
         }
         found = ceiling;
-        search.within((0.97 / ceiling).min(0.97));
+        let over = if worst.share() > 1.0 { worst.share() } else { ceiling };
+        search.within((0.97 / over).min(0.97));
     }
     let clip = clip.name.clone();
     Err(BakeError::Missed { clip, tolerance: worst.limit, reached: found * worst.limit, time: worst.time })

@@ -243,7 +243,8 @@ impl Channel {
         let still = based && form == Form::Keys(vec![range.start], true);
         let step = if still { 0.0 } else { step_of(r.get(8)? as u8) };
         let count = form.count();
-        let lanes = (0..if still { 0 } else { width }).map(|_| Lane::read(r, count)).collect::<Option<_>>()?;
+        let lanes =
+            (0..if still { 0 } else { width }).map(|_| Lane::read(r, count)).collect::<Option<_>>()?;
         Some(Self { target, form, step, base, lanes })
     }
 
