@@ -9,6 +9,7 @@ mod cubic;
 pub mod edit;
 mod fit;
 mod gauge;
+mod pack;
 mod plan;
 #[cfg(test)]
 mod tests;
@@ -16,6 +17,7 @@ mod times;
 pub mod xzx;
 
 pub use gauge::{Gauge, Lever, Looks, Metric, Spot, Watch, Worst};
+pub use pack::{PackedBake, pack};
 
 use crate::character::Character;
 use crate::clip::Clip;
@@ -255,7 +257,12 @@ pub fn bake_watched(
     Err(BakeError::Frames { clip: name, fps, tolerance, reached, time, better })
 }
 
+<<<<<<< HEAD
 fn check(character: &Character, clip: &Clip, desc: &BakeDesc) -> Result<(), BakeError> {
+=======
+/// Whether what is asked for means anything.
+fn check(character: &Character, desc: &BakeDesc) -> Result<(), BakeError> {
+>>>>>>> w-forms
     let mut asked = std::iter::once(desc.tolerance).chain(desc.pins.iter().map(|p| p.1));
     if let Some(found) = asked.find(|t| t.is_nan() || *t <= 0.0) {
         return Err(BakeError::Tolerance { found });
