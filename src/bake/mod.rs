@@ -257,12 +257,8 @@ pub fn bake_watched(
     Err(BakeError::Frames { clip: name, fps, tolerance, reached, time, better })
 }
 
-<<<<<<< HEAD
-fn check(character: &Character, clip: &Clip, desc: &BakeDesc) -> Result<(), BakeError> {
-=======
 /// Whether what is asked for means anything.
-fn check(character: &Character, desc: &BakeDesc) -> Result<(), BakeError> {
->>>>>>> w-forms
+fn check(character: &Character, clip: &Clip, desc: &BakeDesc) -> Result<(), BakeError> {
     let mut asked = std::iter::once(desc.tolerance).chain(desc.pins.iter().map(|p| p.1));
     if let Some(found) = asked.find(|t| t.is_nan() || *t <= 0.0) {
         return Err(BakeError::Tolerance { found });
