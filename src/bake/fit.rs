@@ -159,6 +159,18 @@ pub(super) fn fitted(s: &Samples, tolerance: f64, stored: impl Fn(&[f32]) -> Vec
     exact
 }
 
+/// How far pieces are from the samples at most.
+pub(super) fn worst(s: &Samples, p: &Pieces) -> f64 {
+    let w = s.width;
+    let piece = |(k, ends): (usize, &[usize])| {
+        let (a, b) = (&p.values[k * w..(k + 1) * w], &p.values[(k + 1) * w..(k + 2) * w]);
+        let h = s.times[ends[1]] - s.times[ends[0]];
+        let at = |i: usize| if h > 0.0 { (s.times[i] - s.times[ends[0]]) / h } else { (i - ends[0]) as f64 };
+        (ends[0]..=ends[1]).map(|i| off(s.kind, a, b, at(i) as f32, s.value(i))).fold(0.0, f64::max)
+    };
+    p.keys.windows(2).enumerate().map(piece).fold(0.0, f64::max)
+}
+
 impl Samples {
     /// Whether the pieces stay within the tolerance of every sample.
     fn holds(&self, p: &Pieces, tolerance: f64) -> bool {

@@ -2,8 +2,10 @@
 
 mod curve;
 mod mirror;
+pub(crate) mod packed;
 
 pub use curve::{Curve, CurveError, Interpolation};
+pub use packed::{Packed, PackedError};
 
 use crate::pose::Pose;
 use crate::skeleton::{BoneId, Skeleton};
