@@ -11,6 +11,7 @@ mod fit;
 mod gauge;
 mod pack;
 mod plan;
+pub mod retarget;
 #[cfg(test)]
 mod tests;
 mod times;

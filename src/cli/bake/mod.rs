@@ -1,13 +1,17 @@
 //! `sinew bake`: curves to curves within an error.
 
 mod clips;
+mod fresh;
+mod motion;
 mod report;
+mod to;
 mod values;
 mod write;
 
 use super::{Failure, load, print, say::Say};
 use report::Done;
-use sinew::bake::{self, BakeDesc, BakeError, Gauge, Goal, Metric};
+use sinew::bake::{BakeDesc, BakeError, Gauge, Goal, Metric};
+use sinew::character::Instance;
 use sinew::io::Options;
 use std::path::PathBuf;
 use values::{Tolerance, factor, fewest, metric, part, pin, tolerance};
@@ -19,18 +23,22 @@ Examples:
   sinew bake fox.glb -o run.gltf --clip Run --json
   sinew bake fox.glb -o back.glb --clip Walk --trim 0.2..0.6 --reverse --speed 1.5
   sinew bake fox.glb -o all.glb --concat Everything
+  sinew bake fox.glb -o fox.json                        a rig of ours: XZX angles, to be edited
+  sinew bake fox.json -o fox.glb                        and back
+  sinew bake walk.bvh -o walk.glb                       a capture on its own skeleton
+  sinew bake hero.glb --motion walk.bvh -o walks.glb --retarget map.json
 
 No vertex of the skin moves by more than the tolerance, at any time: at keys, at frames and between them, compared
 240 times a second or more, with an estimate of what hides between. What was reached is printed
-and written into asset.extras.sinew. Everything but the animations is carried through untouched. Where the bound cannot be kept, nothing is
+and written into asset.extras.sinew. From glTF to glTF everything but the animations is carried through untouched. Where the bound cannot be kept, nothing is
 written and the exit code is 4.";
 
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// A glTF file (.gltf, .glb).
+    /// A glTF file (.gltf, .glb), a rig (.json) or a capture (.bvh).
     input: PathBuf,
-    /// Where the result goes: .glb, or .gltf with a .bin beside it.
+    /// Where the result goes: .glb, .gltf with a .bin beside it, or .json (a rig of ours) with poses and pictures beside it.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// How far any vertex may be off: metres (0.001, 1m, 2cm, 0.5mm) or a part of the rest pose's diagonal (0.02%).
@@ -54,6 +62,10 @@ pub struct Args {
     /// Play faster: 2 lasts half as long.
     #[arg(long, value_name = "FACTOR", value_parser = factor, allow_hyphen_values = true)]
     speed: Option<f64>,
+    #[command(flatten)]
+    to: to::To,
+    #[command(flatten)]
+    motion: motion::Motion,
     /// Join the clips into one of this name.
     #[arg(long, value_name = "NAME", conflicts_with = "clip")]
     concat: Option<String>,
@@ -76,12 +88,16 @@ pub struct Args {
 
 pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     write::check_output(args)?;
-    let import = load(&args.input, Options::default(), say)?;
-    if import.format != "glTF" {
-        let message =
-            format!("{}: baking reads glTF files; this is a {}", args.input.display(), import.format);
+    let form = args.to.form(&args.output)?;
+    // From glTF to glTF pictures are not touched.
+    let named = |e: &str| args.input.extension().is_some_and(|x| x.eq_ignore_ascii_case(e));
+    let textures = to::is_rig(&args.output) || !(named("glb") || named("gltf"));
+    let mut import = load(&args.input, Options { textures }, say)?;
+    if import.setting.is_some() {
+        let message = format!("{}: this is a {}; expected a character", args.input.display(), import.format);
         return Err(Failure::Usage(message));
     }
+    let motions = args.motion.apply(&mut import, say)?;
     let clips = import.asset.character.clips();
     let chosen: Vec<usize> = match super::find_clip(&import, args.clip.as_deref())? {
         Some(one) if args.clip.is_some() => vec![one],
@@ -100,32 +116,43 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
         Ok((bone.ok_or_else(missing)?, *limit))
     });
     let pins = pins.collect::<Result<_, _>>()?;
+    let vertices = |i: &Instance| import.asset.character.mesh(i).positions.len();
+    let skin = import.asset.character.instances().iter().map(vertices).sum::<usize>() > 0;
+    // A skeleton without a skin: what may hang on its bones.
+    let metric = match args.metric {
+        Metric::Vertices if !skin => Metric::Shell(0.02 * diagonal),
+        metric => metric,
+    };
     let metres = match args.tolerance {
         Tolerance::Metres(m) => m,
         Tolerance::OfDiagonal(part) => part * diagonal,
     };
     let desc = BakeDesc {
         tolerance: metres,
-        metric: args.metric,
+        metric,
         pins,
         quantize: !args.no_quantize,
         goal: args.fewest,
         threads,
+        ..BakeDesc::default()
     };
     let clips = clips::edited(args, &import, &chosen)?;
     let bar = say.progress(clips.len());
     let mut done = vec![];
     for (clip, replaces) in &clips {
-        let baked = bake::bake(&import.asset.character, clip, &desc).map_err(|e| match e {
+        let baked = to::bake(form, &import.asset.character, clip, &desc).map_err(|e| match e {
             BakeError::Missed { .. } => Failure::Differs(format!("{}: {e}", args.input.display())),
             _ => Failure::Usage(format!("{}: {e}", args.input.display())),
         })?;
-        done.push(Done { clip, replaces: *replaces, baked });
+        done.push(Done { clip, replaces: replaces.filter(|_| args.motion.is_empty()), baked });
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let told = report::report(&import, &done, args.metric, metres, diagonal);
-    write::write(args, &import, &done, &told)?;
+    let mut told = report::report(&import, &done, metric, metres, diagonal);
+    if !motions.is_empty() {
+        told["motions"] = motions.into();
+    }
+    write::write(args, &import, &done, &told, say)?;
     if args.json {
         return print(format!("{told:#}\n").as_bytes());
     }

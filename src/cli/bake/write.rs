@@ -1,8 +1,8 @@
 //! The file that comes out.
 
-use super::Args;
 use super::report::Done;
-use crate::cli::Failure;
+use super::{Args, fresh, to};
+use crate::cli::{Failure, say::Say};
 use serde_json::{Map, Value};
 use sinew::io::picture::{AtomicFile, Folder};
 use sinew::io::{self, Import, gltf};
@@ -11,10 +11,12 @@ use std::path::Path;
 /// Say so before the work and not after it.
 pub(super) fn check_output(args: &Args) -> Result<(), Failure> {
     let name = args.output.display();
-    let known =
-        args.output.extension().is_some_and(|e| ["glb", "gltf"].iter().any(|k| e.eq_ignore_ascii_case(k)));
+    let known = args
+        .output
+        .extension()
+        .is_some_and(|e| ["glb", "gltf", "json"].iter().any(|k| e.eq_ignore_ascii_case(k)));
     if !known {
-        return Err(Failure::Usage(format!("-o {name}: expected a name that ends in .glb or .gltf")));
+        return Err(Failure::Usage(format!("-o {name}: expected a name that ends in .glb, .gltf or .json")));
     }
     if args.output.exists() && !args.force {
         return Err(Failure::Run(format!("{name}: the file exists; --force overwrites it")));
@@ -26,7 +28,44 @@ pub(super) fn check_output(args: &Args) -> Result<(), Failure> {
     }
 }
 
-pub(super) fn write(args: &Args, import: &Import, done: &[Done], report: &Value) -> Result<(), Failure> {
+pub(super) fn write(
+    args: &Args,
+    import: &Import,
+    done: &[Done],
+    report: &Value,
+    say: &Say,
+) -> Result<(), Failure> {
+    let extras = Map::from_iter([("sinew".to_owned(), report.clone())]);
+    if to::is_rig(&args.output) {
+        for (name, bytes) in fresh::rig(&args.output, &args.input, import, done, say)? {
+            put(args, &args.output.with_file_name(name), &bytes)?;
+        }
+        return Ok(());
+    }
+    let out = match import.format.as_str() {
+        "glTF" => rewritten(args, import, done, extras)?,
+        _ => fresh::gltf(&args.input, import, done, extras, say)?,
+    };
+    if args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf")) {
+        let bin = args.output.with_extension("bin");
+        let uri = bin.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        put(args, &bin, &out.bin)?;
+        return put(args, &args.output, &out.gltf(&uri));
+    }
+    put(args, &args.output, &out.glb())
+}
+
+fn put(args: &Args, path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    AtomicFile::write(path, bytes, args.force, Folder::MustExist).map_err(|e| Failure::Run(e.to_string()))
+}
+
+/// The input with other clips.
+fn rewritten(
+    args: &Args,
+    import: &Import,
+    done: &[Done],
+    extras: Map<String, Value>,
+) -> Result<gltf::Rewritten, Failure> {
     let bad = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", args.input.display()));
     let bytes = io::read_file(&args.input).map_err(|e| bad(&e))?;
     let folder = args.input.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -34,7 +73,6 @@ pub(super) fn write(args: &Args, import: &Import, done: &[Done], report: &Value)
         .iter()
         .map(|d| gltf::NewClip { clip: &d.baked.clip, short: &d.baked.short, replaces: d.replaces })
         .collect();
-    let extras = Map::from_iter([("sinew".to_owned(), report.clone())]);
     let name = args.input.display().to_string();
     let mut out =
         gltf::with_clips(&bytes, Some(folder), &name, import, &clips, extras).map_err(|e| bad(&e))?;
@@ -43,14 +81,5 @@ pub(super) fn write(args: &Args, import: &Import, done: &[Done], report: &Value)
     if folder.canonicalize().ok() != there.canonicalize().ok() {
         out.embed_pictures(Some(folder)).map_err(|e| bad(&e))?;
     }
-    let put = |path: &Path, bytes: &[u8]| {
-        AtomicFile::write(path, bytes, args.force, Folder::MustExist).map_err(|e| Failure::Run(e.to_string()))
-    };
-    if args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf")) {
-        let bin = args.output.with_extension("bin");
-        let uri = bin.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        put(&bin, &out.bin)?;
-        return put(&args.output, &out.gltf(&uri));
-    }
-    put(&args.output, &out.glb())
+    Ok(out)
 }
