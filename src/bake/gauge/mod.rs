@@ -214,6 +214,12 @@ impl<'a> Gauge<'a> {
         found.into_inner()
     }
 
+    /// How far a clip's last pose is from its first.
+    pub fn seam(&self, clip: &Clip) -> Worst {
+        let crate::time::Range { start, end } = clip.range();
+        Worst { time: end, ..self.between(&self.pose(clip, start), &self.pose(clip, end)) }
+    }
+
     /// How far one pose is from another.
     pub fn between(&self, a: &Pose, b: &Pose) -> Worst {
         let mut bench = Bench::default();
