@@ -11,7 +11,7 @@ use clips::EditArgs;
 use report::Done;
 use serde_json::{Value, json};
 use sinew::bake::edit::EditError;
-use sinew::bake::{self, BakeDesc, BakeError, Gauge, Goal, Metric};
+use sinew::bake::{self, BakeDesc, BakeError, Gauge, Goal, Metric, Stage};
 use sinew::io::{Import, Options};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
