@@ -111,6 +111,7 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
         quantize: !args.no_quantize,
         goal: args.fewest,
         threads,
+        ..BakeDesc::default()
     };
     let clips = clips::edited(args, &import, &chosen)?;
     let bar = say.progress(clips.len());
