@@ -228,7 +228,6 @@ pub fn bake_watched(
     gauge.enter(Stage::Search);
     let mut baked = plan.search(&gauge);
     gauge.enter(Stage::Check);
-    let mut share = 1.0;
     for _ in 0..8 {
         let Verdict { worst, ceiling, moments } = times::verify(&gauge, clip, &baked.clip);
         let report = &mut baked.report;
@@ -238,8 +237,7 @@ pub fn bake_watched(
         }
         // What hid between the moments of the search: aim a little lower.
         let over = if worst.share() > 1.0 { worst.share() } else { ceiling };
-        share *= (0.95 / over).min(0.9);
-        baked = plan.within(share);
+        baked = plan.within((0.95 / over).min(0.9));
     }
     let plain = plan.untouched();
     let Verdict { worst, ceiling, moments } = times::verify(&gauge, clip, &plain.clip);
