@@ -201,7 +201,7 @@ fn one(
     for e in &edited {
         let desc = BakeDesc { cycle: e.cycle, over: e.over.clone(), ..desc.clone() };
         let poses = AtomicUsize::new(0);
-        let watch = |n: usize| {
+        let watch = |_: Stage, n: usize| {
             let all = poses.fetch_add(n, Ordering::Relaxed) + n;
             bar.set_message(format!(
                 "{}, {}: {all} poses compared",
