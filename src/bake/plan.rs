@@ -2,7 +2,7 @@
 
 use super::fit::{self, Kind, Samples};
 use super::gauge::Gauge;
-use super::{BakeDesc, Baked, Goal, Report, cubic, times};
+use super::{BakeDesc, Baked, Goal, Report, SEAM, cubic, edit, times};
 use crate::character::Character;
 use crate::clip::{Clip, Curve, Interpolation, Target, Track};
 use std::collections::BTreeSet;
@@ -45,14 +45,15 @@ pub(super) struct Plan<'a> {
 }
 
 impl<'a> Plan<'a> {
-    pub fn new(character: &Character, clip: &'a Clip, gauge: &Gauge, desc: &BakeDesc) -> Self {
+    /// `start` holds the keys to choose from; what they make is compared with `clip`.
+    pub fn new(character: &Character, clip: &'a Clip, start: &Clip, gauge: &Gauge, desc: &BakeDesc) -> Self {
         let levers = gauge.levers(clip, &times::coarse(clip, LEVER_MOMENTS));
         let longest = levers.iter().map(|l| l.turn).fold(0.0, f64::max);
-        let rest = character.rest_pose();
+        let rest = gauge.unmoved();
         let targets = character.target_reach();
         let vertices = character.instances().iter().map(|i| character.mesh(i).positions.len()).sum();
         let mut jobs: Vec<Job> = vec![];
-        for track in &clip.tracks {
+        for track in &start.tracks {
             let at = |b: crate::skeleton::BoneId| levers[b.index()].turn.max(0.02 * longest).max(1e-9);
             let (kind, lever, rest) = match track.target {
                 Target::Rotation(b) => {
@@ -177,7 +178,7 @@ impl<'a> Plan<'a> {
         });
         let mut clip = Clip { name: self.clip.name.clone(), tracks: tracks.collect() };
         self.hold_ends(&mut clip);
-        clip
+        if self.desc.cycle { edit::close(&clip, SEAM) } else { clip }
     }
 
     /// A clip lasts as long as it did: the shortest track says so where what moved at the ends is gone.
@@ -253,8 +254,8 @@ impl Job {
     }
 
     /// The fewest keys within `allowed`, and whether they are 16-bit integers.
-    fn reduced(&self, allowed: f64, BakeDesc { quantize, goal, .. }: &BakeDesc) -> Option<(Curve, bool)> {
-        let (s, quantize, goal) = (&self.samples, *quantize, *goal);
+    fn reduced(&self, allowed: f64, desc: &BakeDesc) -> Option<(Curve, bool)> {
+        let (s, quantize, goal) = (&self.samples, desc.quantize, desc.goal);
         if s.is_constant(&self.rest, allowed) {
             return None;
         }
@@ -263,6 +264,18 @@ impl Job {
         let first = stored(s.value(0));
         if s.is_constant(&first, allowed) {
             let curve = Curve::new(vec![s.times[0]], first, s.width, Interpolation::Hold);
+            return curve.ok().map(|c| (c, short));
+        }
+        if desc.keep_keys {
+            // Slopes need more than 16 bits hold.
+            let source = self.source.with_slopes();
+            let short = short && source.interpolation() != Interpolation::Hermite;
+            let values = if short {
+                source.values().iter().map(|x| shortened(*x)).collect()
+            } else {
+                source.values().to_vec()
+            };
+            let curve = Curve::new(source.times().to_vec(), values, s.width, source.interpolation());
             return curve.ok().map(|c| (c, short));
         }
         if self.source.interpolation() == Interpolation::Hold {

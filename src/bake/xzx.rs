@@ -82,7 +82,7 @@ pub fn to_quat(character: &Character, clip: &Clip, desc: &BakeDesc) -> Result<Ba
 }
 
 fn convert(character: &Character, clip: &Clip, desc: &BakeDesc, form: Form) -> Result<Baked, BakeError> {
-    check(character, desc)?;
+    check(character, clip, desc)?;
     let gauge = Gauge::of(character, desc);
     let levers = gauge.levers(clip, &times::coarse(clip, plan::LEVER_MOMENTS));
     let longest = levers.iter().map(|l| l.turn).fold(0.0, f64::max);

@@ -27,7 +27,7 @@ pub struct PackedBake {
 /// # Panics
 /// If the clip is not of the character.
 pub fn pack(character: &Character, clip: &Clip, desc: &BakeDesc) -> Result<PackedBake, BakeError> {
-    super::check(character, desc)?;
+    super::check(character, clip, desc)?;
     let gauge = Gauge::of(character, desc);
     let mut search = Search::new(character, clip, &gauge, desc);
     search.share();
