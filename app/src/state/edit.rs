@@ -1,6 +1,6 @@
 //! Edits: what changes the document. Each says what it is called, for the menu.
 
-use super::{EditClip, Marker, Selection, State};
+use super::{EditClip, Marker, State};
 use glam::{Quat, Vec3};
 use sinew::clip::{Clip, CurveError, Interpolation};
 use sinew::skeleton::BoneId;

@@ -165,7 +165,7 @@ impl State {
     /// `wanted` is true of rotations, and of translations of roots.
     fn key_bones(&mut self, bones: &[BoneId], fresh: &dyn Fn(bool, bool) -> bool) -> Result<(), Refused> {
         let (pose, keyed) = (self.pose(), self.pose_at(self.time));
-        self.selection.keys = Keys::new();
+        self.selected().keys = Keys::new();
         for &bone in bones {
             let local = pose.locals[bone.index()];
             let (theta, root) = (self.theta(bone), self.document.skeleton().parent(bone).is_none());
@@ -210,7 +210,7 @@ impl State {
             self.active_mut().tracks.push(Arc::new(Track { target, curve }));
             let track = self.active().tracks.len() as u32 - 1;
             let keys = TrackKeys { spans: Spans::one(0..1), mask: u8::MAX };
-            self.selection.keys.insert(track, keys);
+            self.selected().keys.insert(track, keys);
         }
         Ok(())
     }
@@ -220,7 +220,7 @@ impl State {
         let curve = self.active().tracks[track].curve.with_key(at, value)?;
         let keys = TrackKeys { spans: Spans::from_indices(curve.key_at(at)), mask: u8::MAX };
         self.set_curve(track, curve);
-        self.selection.keys.insert(track as u32, keys);
+        self.selected().keys.insert(track as u32, keys);
         Ok(())
     }
 }
