@@ -1,0 +1,15 @@
+//! Inspector.
+
+use crate::Bus;
+use crate::state::State;
+
+/// The pane.
+#[derive(Default)]
+pub struct Inspector {}
+
+impl Inspector {
+    /// Draw it.
+    pub fn ui(&mut self, ui: &mut egui::Ui, _state: &State, _bus: &mut Bus) {
+        ui.label("inspector");
+    }
+}
