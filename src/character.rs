@@ -1,5 +1,7 @@
 //! A character: skeleton, meshes, what binds them, and clips, cross-checked once.
 
+mod symmetry;
+
 use crate::clip::{Clip, Target};
 use crate::fk::{self, Posed};
 use crate::mesh::Mesh;

@@ -1,5 +1,8 @@
 //! A pose: one set of channels a bone, and the weights of the morph targets.
 
+pub mod mirror;
+pub mod sides;
+
 use crate::math::{Trs, euler};
 use crate::skeleton::{BoneId, Skeleton};
 use glam::{DAffine3, Quat, Vec3};

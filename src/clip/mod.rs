@@ -1,6 +1,7 @@
 //! Clips: tracks of keys that turn a time into a pose.
 
 mod curve;
+mod mirror;
 mod edit;
 
 pub use curve::{Curve, CurveError, Interpolation};
