@@ -9,6 +9,15 @@ use crate::viewport::Viewport;
 use egui::KeyboardShortcut;
 use std::time::Duration;
 
+/// Fonts and look; once, before the first frame.
+pub fn set_up(ctx: &egui::Context) {
+    let mut fonts = egui::FontDefinitions::default();
+    // Arrows and diamonds are in the font of code alone.
+    fonts.families.entry(egui::FontFamily::Proportional).or_default().push("Hack".into());
+    ctx.set_fonts(fonts);
+    ctx.set_theme(egui::Theme::Dark);
+}
+
 /// What panes ask for while they draw; done when the last has drawn.
 #[derive(Default)]
 pub struct Bus {

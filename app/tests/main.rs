@@ -1,6 +1,7 @@
 //! Promises of the editor, one binary.
 
 mod random;
+mod session;
 
 use sinew::asset::Asset;
 use std::path::PathBuf;

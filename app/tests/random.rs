@@ -42,7 +42,7 @@ impl Rng {
 
 fn edit(r: &mut Rng, s: &State) -> Edit {
     let bones = s.document.skeleton().len() + r.below(2);
-    match r.below(24) {
+    match r.below(25) {
         0 | 1 => Edit::InsertKeys,
         2 => Edit::DeleteKeys,
         3..=5 => Edit::MoveKeys {
@@ -81,6 +81,7 @@ fn edit(r: &mut Rng, s: &State) -> Edit {
         20 if s.document.clips.len() < 4 => Edit::NewClip("another".into()),
         21 => Edit::RenameClip(format!("clip {}", r.below(9))),
         22 if r.below(8) == 0 => Edit::DeleteClip,
+        24 if r.below(4) == 0 => Edit::MirrorClip,
         23 if r.below(8) == 0 => Edit::ReplaceClips("Bake", s.document.to_clips()),
         _ => Edit::InsertKeys,
     }
@@ -156,10 +157,11 @@ fn a_hundred_thousand_commands_keep_every_promise_and_undo_to_the_start() {
     for _ in 0..100_000 {
         let c = command(&mut r, &s);
         let (before, text) = (s.document.clone(), format!("{c:?}"));
-        let keys_move = matches!(&c, Command::Do(Edit::MoveKeys { seconds, .. }) if *seconds != 0.0);
+        let mut keys_move = matches!(&c, Command::Do(Edit::MoveKeys { seconds, .. }) if *seconds != 0.0);
         match s.update(c) {
             Ok(()) => done += 1,
             Err(_) => {
+                keys_move = false;
                 refused += 1;
                 let preview = text.starts_with("Preview");
                 assert!(preview || s.document.same_bits(&before), "{text} was refused and left a trace");

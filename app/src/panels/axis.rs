@@ -110,7 +110,7 @@ pub fn frame(from: f64, to: f64, width: f32, state: &State, bus: &mut Bus) {
 /// The ruler over the keys: ticks, range, markers; a drag in it scrubs.
 pub fn ruler(ui: &mut egui::Ui, axis: &Axis, name: &str, state: &State, bus: &mut Bus) {
     let rect = Rect::from_min_max(pos2(axis.rect.left(), axis.rect.top() - RULER), axis.rect.right_top());
-    let response = ui.interact(rect, ui.id().with("ruler"), Sense::click_and_drag());
+    let response = ui.interact(rect, ui.scope_id().with("ruler"), Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Slider, true, name));
     let held = response.is_pointer_button_down_on() && ui.input(|i| i.pointer.primary_down());
     if let (true, Some(at)) =
@@ -122,8 +122,9 @@ pub fn ruler(ui: &mut egui::Ui, axis: &Axis, name: &str, state: &State, bus: &mu
         if over != 0.0 {
             show(axis.start + f64::from(over) * 0.2 * axis.scale, axis.scale, axis, state, bus);
         }
-        if state.key_time(axis.t(x)) != state.time {
-            bus.send(Command::SetTime(axis.t(x)));
+        let t = state.key_time(axis.t(x));
+        if t != state.time {
+            bus.send(Command::SetTime(t));
         }
     }
     let painter = ui.painter_at(rect);
@@ -174,7 +175,7 @@ fn markers(ui: &egui::Ui, painter: &egui::Painter, rect: Rect, axis: &Axis, stat
             continue;
         }
         let hit = Rect::from_center_size(pos2(x, rect.bottom() - 7.0), Vec2::splat(14.0));
-        let response = ui.interact(hit, ui.id().with(("marker", i)), Sense::click());
+        let response = ui.interact(hit, ui.scope_id().with(("marker", i)), Sense::click());
         let name = format!("marker {}", marker.name);
         response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Button, true, &name));
         if response.clicked() {

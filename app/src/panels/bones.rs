@@ -101,7 +101,7 @@ impl Bones {
         let fold = Rect::from_min_size(pos2(left - 2.0, rect.top()), Vec2::new(14.0, ROW));
         if has_children {
             let folded = self.folded.contains(&bone);
-            let text = if folded { "⏵" } else { "⏷" };
+            let text = if folded { "▸" } else { "▾" };
             ui.painter().text(
                 fold.center(),
                 Align2::CENTER_CENTER,

@@ -30,6 +30,7 @@ pub struct Dope {
     grip: Grip,
     last_time: f64,
     width: f32,
+    shown: Option<Arc<sinew::asset::Asset>>,
     /// What a command asked for, to be done when the pane is drawn next.
     pub pending: Option<Task>,
 }
@@ -98,9 +99,14 @@ impl Dope {
         let keys = Rect::from_min_max(pane.min + Vec2::new(NAMES, RULER), pane.max);
         let axis = Axis::new(&state.view, keys);
         self.width = keys.width();
+        if !self.shown.as_ref().is_some_and(|a| Arc::ptr_eq(a, &state.document.asset)) {
+            self.shown = Some(state.document.asset.clone());
+            let range = state.active().range;
+            self.frame(range.start, range.end, state, bus);
+        }
         let body = Rect::from_min_max(keys.min + Vec2::new(0.0, ROW), keys.max);
 
-        let sense = ui.interact(pane, ui.id().with("dope"), Sense::click_and_drag());
+        let sense = ui.interact(pane, ui.scope_id().with("dope"), Sense::click_and_drag());
         sense.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Grid, true, "Dope sheet"));
         self.scroll -= axis::navigate(ui, pane, &axis, state, bus);
         self.keep_scroll(body);
@@ -246,8 +252,9 @@ impl Dope {
         let to = (axis.t(at.x), f64::from(at.y - body.top() + self.scroll));
         let corner = pos2(axis.x(from.0), body.top() + from.1 as f32 - self.scroll);
         let shown = Rect::from_two_pos(corner, at);
-        let painter =
-            ui.painter_at(axis.rect).with_layer_id(egui::LayerId::new(egui::Order::Foreground, ui.id()));
+        let painter = ui
+            .painter_at(axis.rect)
+            .with_layer_id(egui::LayerId::new(egui::Order::Foreground, ui.scope_id()));
         painter.rect(
             shown,
             0.0,
@@ -284,7 +291,7 @@ impl Dope {
         let keys = painter.with_clip_rect(axis.rect);
         axis::grid(&keys, axis, state, ui.visuals());
         let mut mesh = egui::Mesh::default();
-        let mut names = Names { ui, state };
+        let mut names = Names(ui);
 
         // The summary, then the rows.
         let mid = axis.rect.top() + ROW / 2.0;
@@ -362,7 +369,7 @@ impl Dope {
     }
 
     fn footer(&self, painter: &egui::Painter, pane: Rect, state: &State) {
-        let mut say = |text: &str| {
+        let say = |text: &str| {
             let at = pane.right_bottom() - Vec2::new(6.0, 4.0);
             painter.text(at, Align2::RIGHT_BOTTOM, text, FontId::proportional(11.0), SELECTED);
         };
@@ -377,22 +384,19 @@ impl Dope {
 }
 
 /// Key nodes for assistive technology and for tests: there where somebody listens, of keys that can be seen.
-pub(super) struct Names<'a> {
-    pub ui: &'a egui::Ui,
-    pub state: &'a State,
-}
+pub(super) struct Names<'a>(pub &'a egui::Ui);
 
 impl Names<'_> {
     pub fn add(&mut self, at: Pos2, name: impl Fn() -> String) {
-        let ui = self.ui;
-        if !ui.ctx().has_accesskit_node(ui.id().with("dope"))
-            && !ui.ctx().has_accesskit_node(ui.id().with("graph"))
+        let ui = self.0;
+        if !ui.ctx().has_accesskit_node(ui.scope_id().with("dope"))
+            && !ui.ctx().has_accesskit_node(ui.scope_id().with("graph"))
         {
             return;
         }
         let name = name();
         let rect = Rect::from_center_size(at, Vec2::splat(2.0 * axis::HIT));
-        let response = ui.interact(rect, ui.id().with(("key", &name)), Sense::hover());
+        let response = ui.interact(rect, ui.scope_id().with(("key", &name)), Sense::hover());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Button, true, &name));
     }
 }

@@ -97,7 +97,7 @@ impl Graph {
         let (low, high) = self.range(&channels, &axis);
         let values = Values { rect, low, high };
 
-        let sense = ui.interact(pane, ui.id().with("graph"), Sense::click_and_drag());
+        let sense = ui.interact(pane, ui.scope_id().with("graph"), Sense::click_and_drag());
         sense.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Canvas, true, "Graph"));
         let up = axis::navigate(ui, pane, &axis, state, bus);
         self.scroll(ui, pane, up, &values);
@@ -235,8 +235,9 @@ impl Graph {
             return;
         }
         let shown = Rect::from_two_pos(pos2(axis.x(from.0), values.y(from.1)), at);
-        let painter =
-            ui.painter_at(axis.rect).with_layer_id(egui::LayerId::new(egui::Order::Foreground, ui.id()));
+        let painter = ui
+            .painter_at(axis.rect)
+            .with_layer_id(egui::LayerId::new(egui::Order::Foreground, ui.scope_id()));
         painter.rect(
             shown,
             0.0,
@@ -271,7 +272,7 @@ impl Graph {
         axis::grid(&inner, axis, state, ui.visuals());
         levels(&painter, values, ui.visuals());
         let mut mesh = egui::Mesh::default();
-        let mut names = Names { ui, state };
+        let mut names = Names(ui);
         for c in channels {
             curve(&inner, axis, values, c);
             let chosen = state.selection.keys.get(&(c.track as u32)).filter(|k| k.mask & c.bit() != 0);

@@ -84,7 +84,14 @@ fn number(
     range: (f32, f32),
 ) -> egui::Response {
     ui.label(label);
-    let field = DragValue::new(value).speed(speed).suffix(suffix).max_decimals(3).range(range.0..=range.1);
+    // What a clip does beyond the limits is shown as it is.
+    let field = DragValue::new(value)
+        .speed(speed)
+        .suffix(suffix)
+        .max_decimals(3)
+        .range(range.0..=range.1)
+        .clamp_existing_to_range(false)
+        .update_while_editing(false);
     let response = ui.add(field);
     ui.end_row();
     response.accessible_name(name)

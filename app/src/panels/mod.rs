@@ -57,10 +57,17 @@ impl Panels {
         self.toasts.ui(ctx);
     }
 
+    /// Show what a pane does.
+    pub fn help_on(&mut self, pane: Pane) {
+        self.help = Some(pane);
+    }
+
     /// What a command asks of a pane.
     pub fn task(&mut self, task: Task, state: &State, bus: &mut Bus) {
         match task {
-            Task::Palette => self.palette.show(),
+            Task::Palette => self.palette.show(""),
+            // The actions that say so.
+            Task::Interpolation => self.palette.show("per track"),
             Task::Help => self.help = self.hovered.or(Some(Pane::Viewport)),
             Task::FrameAll => {
                 let r = state.active().range;

@@ -132,7 +132,19 @@ impl State {
         let changes = self.clipboard.pose.clone();
         match mirror {
             Mirror::No => self.apply_pose(&changes),
-            Mirror::ByName => Err(Refused::Bad("mirrored poses are not there yet".into())),
+            Mirror::ByName => {
+                let mirror = self.document.asset.character.mirror();
+                let image = |(b, c): (BoneId, Change)| {
+                    let change = match c {
+                        Change::Rotation(q) => Change::Rotation(mirror.rotation(b, q)),
+                        Change::Translation(v) => Change::Translation(mirror.translation(b, v)),
+                        Change::Scale(v) => Change::Scale(mirror.scale(b, v)),
+                        Change::Xzx(theta) => Change::Xzx(mirror.xzx(b, theta, None)),
+                    };
+                    (mirror.pair(b), change)
+                };
+                self.apply_pose(&changes.into_iter().map(image).collect::<Vec<_>>())
+            }
         }
     }
 
