@@ -7,10 +7,10 @@ mod write;
 
 use super::{Failure, load, print, say::Say};
 use report::Done;
-use sinew::bake::{self, BakeDesc, BakeError, Gauge, Metric};
+use sinew::bake::{self, BakeDesc, BakeError, Gauge, Goal, Metric};
 use sinew::io::Options;
 use std::path::PathBuf;
-use values::{Tolerance, factor, metric, part, pin, tolerance};
+use values::{Tolerance, factor, fewest, metric, part, pin, tolerance};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -57,6 +57,9 @@ pub struct Args {
     /// Join the clips into one of this name.
     #[arg(long, value_name = "NAME", conflicts_with = "clip")]
     concat: Option<String>,
+    /// What there is to be little of: bytes of the file, or keys to edit, which cubic curves need fewer of.
+    #[arg(long, value_name = "bytes|keys", default_value = "bytes", value_parser = fewest)]
+    fewest: Goal,
     /// Keep rotations as 32-bit floating point.
     #[arg(long)]
     no_quantize: bool,
@@ -101,8 +104,15 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
         Tolerance::Metres(m) => m,
         Tolerance::OfDiagonal(part) => part * diagonal,
     };
-    let desc =
-        BakeDesc { tolerance: metres, metric: args.metric, pins, quantize: !args.no_quantize, threads };
+    let desc = BakeDesc {
+        tolerance: metres,
+        metric: args.metric,
+        pins,
+        quantize: !args.no_quantize,
+        goal: args.fewest,
+        threads,
+        ..BakeDesc::default()
+    };
     let clips = clips::edited(args, &import, &chosen)?;
     let bar = say.progress(clips.len());
     let mut done = vec![];

@@ -1,6 +1,6 @@
 //! Values of options: lengths, parts, metrics, bones.
 
-use sinew::bake::Metric;
+use sinew::bake::{Goal, Metric};
 
 #[derive(Clone, Copy)]
 pub(super) enum Tolerance {
@@ -30,6 +30,14 @@ pub(super) fn part(text: &str) -> Result<[Option<f64>; 2], String> {
     match [end(from)?, end(to)?] {
         [Some(a), Some(b)] if a >= b => Err(format!("{a} is not before {b}")),
         ends => Ok(ends),
+    }
+}
+
+pub(super) fn fewest(text: &str) -> Result<Goal, String> {
+    match text {
+        "bytes" => Ok(Goal::Bytes),
+        "keys" => Ok(Goal::Keys),
+        _ => Err("expected bytes or keys".into()),
     }
 }
 
