@@ -1,8 +1,8 @@
 //! Clips: tracks of keys that turn a time into a pose.
 
 mod curve;
-mod mirror;
 mod edit;
+mod mirror;
 
 pub use curve::{Curve, CurveError, Interpolation};
 pub use edit::Retime;
