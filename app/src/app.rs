@@ -9,6 +9,15 @@ use crate::viewport::Viewport;
 use egui::KeyboardShortcut;
 use std::time::Duration;
 
+/// Fonts and look; once, before the first frame.
+pub fn set_up(ctx: &egui::Context) {
+    let mut fonts = egui::FontDefinitions::default();
+    // Arrows and diamonds are in the font of code alone.
+    fonts.families.entry(egui::FontFamily::Proportional).or_default().push("Hack".into());
+    ctx.set_fonts(fonts);
+    ctx.set_theme(egui::Theme::Dark);
+}
+
 /// What panes ask for while they draw; done when the last has drawn.
 #[derive(Default)]
 pub struct Bus {
@@ -128,9 +137,18 @@ impl App {
 
     /// Keys pressed, unless somebody types.
     fn shortcuts(&mut self, ctx: &egui::Context) {
-        if ctx.egui_wants_keyboard_input() || self.panels.modal() {
+        // A drag hears Esc before anybody, and no other key.
+        if self.state.in_gesture() {
+            if ctx.input(|i| i.key_pressed(egui::Key::Escape)) {
+                self.bus.send(Command::Cancel);
+                self.settle(ctx);
+            }
             return;
         }
+        if ctx.text_edit_focused() || self.panels.modal() {
+            return;
+        }
+        self.clipboard(ctx);
         let time = self.panels.hovered.is_some_and(Pane::has_time);
         let here = |s: Scope| s == Scope::Any || (s == Scope::Time) == time;
         let own = ACTIONS.iter().filter_map(|a| a.shortcut.map(|s| (s, a)));
@@ -146,6 +164,27 @@ impl App {
             if ctx.input_mut(|i| i.consume_shortcut(&shortcut)) {
                 self.bus.run(action, &self.state);
             }
+        }
+    }
+
+    /// Copying and pasting come as events of their own; pasting only where the system's clipboard has text.
+    fn clipboard(&mut self, ctx: &egui::Context) {
+        let events = ctx.input(|i| i.events.clone());
+        let time = self.panels.hovered.is_some_and(Pane::has_time);
+        let shift = ctx.input(|i| i.modifiers.shift);
+        for event in events {
+            let name = match event {
+                egui::Event::Copy if time => "Copy keys",
+                egui::Event::Copy => "Copy pose",
+                egui::Event::Paste(_) if shift => "Paste mirrored pose",
+                egui::Event::Paste(_) if time => "Paste keys",
+                egui::Event::Paste(_) => "Paste pose",
+                _ => continue,
+            };
+            if name.starts_with("Copy") {
+                ctx.copy_text("sinew".into());
+            }
+            self.bus.run(named(name), &self.state);
         }
     }
 

@@ -21,6 +21,8 @@ pub enum Task {
     Export,
     /// A search over every action.
     Palette,
+    /// The ways that a track can run between its keys.
+    Interpolation,
     /// Panes where they were at first.
     ResetLayout,
     /// All of the range in the time panes.
@@ -176,7 +178,7 @@ pub static ACTIONS: &[Action] = &[
     act("Keys", "Catmull-Rom", "Smooth through the keys, by the notes' slopes (per track)", None, Time, always, Do(|_| interpolate(Interpolation::CatmullRom(Tangents::Notes)))),
     act("Keys", "Catmull-Rom, three points", "Smooth, by the parabola through three keys (per track)", None, Time, always, Do(|_| interpolate(Interpolation::CatmullRom(Tangents::ThreePoint)))),
     act("Keys", "Catmull-Rom, monotone", "Smooth and never beyond the keys (per track)", None, Time, always, Do(|_| interpolate(Interpolation::CatmullRom(Tangents::Monotone)))),
-    act("Keys", "Next interpolation", "Hold, linear, Catmull-Rom in turn, for the tracks of the selected keys", key(Key::T), Time, always, Do(|s| interpolate(next_interpolation(s)))),
+    act("Keys", "Interpolation…", "Hold, linear or Catmull-Rom by one of three rules, for the tracks of the selected keys", key(Key::T), Any, always, Window(Task::Interpolation)),
     act("Keys", "Automatic keys", "A changed pose becomes keys at once", key(Key::K), Any, always, Do(|s| vec![Command::SetAutoKey(!s.auto_key)])),
     act("Keys", "Snap to frames", "Moved and inserted keys stand on whole frames", None, Any, always, Do(|s| vec![Command::SetSnap(!s.snap)])),
     act("Pose", "Reset rotations", "The selected bones as they are at rest", with(ALT, Key::R), Any, always, Do(|_| edit(Edit::ResetRotations))),
@@ -213,6 +215,7 @@ pub static ACTIONS: &[Action] = &[
     act("View", "Exact quality", "As an export draws it", None, Any, always, Do(|s| view(s, |v| v.quality = Quality::Exact))),
     act("View", "Reset layout", "Panes where they were at first", None, Any, always, Window(Task::ResetLayout)),
     act("Clip", "New clip", "An empty clip", None, Any, always, Do(|s| edit(Edit::NewClip(format!("clip {}", s.document.clips.len() + 1))))),
+    act("Clip", "Mirror clip", "Left does what right did, by bone names", None, Any, |s| !s.active().tracks.is_empty(), Do(|_| edit(Edit::MirrorClip))),
     act("Clip", "Delete clip", "This clip", None, Any, |s| s.document.clips.len() > 1, Do(|_| edit(Edit::DeleteClip))),
     act("Help", "What this pane does", "Gestures and keys of the pane under the pointer", with(SHIFT, Key::Questionmark), Any, always, Window(Task::Help)),
 ];
@@ -241,16 +244,6 @@ fn next_style(of: BoneStyle) -> BoneStyle {
         BoneStyle::Sticks => BoneStyle::Pyramids,
         BoneStyle::Pyramids => BoneStyle::XRay,
         BoneStyle::XRay => BoneStyle::Hidden,
-    }
-}
-
-/// After that of the first track selected.
-fn next_interpolation(s: &State) -> Interpolation {
-    let first = s.selection.keys.keys().next().map_or(0, |&t| t as usize);
-    match s.active().tracks.get(first).map(|t| t.curve.interpolation()) {
-        Some(Interpolation::Hold) => Interpolation::Linear,
-        Some(Interpolation::Linear) => Interpolation::CatmullRom(Tangents::Notes),
-        _ => Interpolation::Hold,
     }
 }
 

@@ -81,6 +81,21 @@ impl Behavior<Pane> for Panes<'_> {
         UiResponse::None
     }
 
+    fn top_bar_right_ui(
+        &mut self,
+        tiles: &Tiles<Pane>,
+        ui: &mut egui::Ui,
+        _: TileId,
+        tabs: &egui_tiles::Tabs,
+        _: &mut f32,
+    ) {
+        let Some(Tile::Pane(pane)) = tabs.active.and_then(|t| tiles.get(t)) else { return };
+        let name = format!("Help on {}", pane.title());
+        if ui.small_button("?").on_hover_text("What this pane does").accessible_name(name).clicked() {
+            self.panels.help_on(*pane);
+        }
+    }
+
     fn tab_title_for_pane(&mut self, pane: &Pane) -> egui::WidgetText {
         pane.title().into()
     }

@@ -15,4 +15,4 @@ pub mod viewport;
 
 mod app;
 
-pub use app::{App, Bus};
+pub use app::{App, Bus, set_up};

@@ -19,6 +19,7 @@ fn main() -> eframe::Result {
                 Ok(import) => (import.map(|i| i.asset).unwrap_or_default(), None),
                 Err(e) => (Default::default(), Some(e.to_string())),
             };
+            sinew_app::set_up(&cc.egui_ctx);
             let mut app = App::new(State::open(Arc::new(asset)));
             cc.storage.into_iter().for_each(|s| app.restore(s));
             notice.into_iter().for_each(|n| app.tell(n));

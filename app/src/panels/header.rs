@@ -30,17 +30,18 @@ impl Header {
     fn time(&mut self, ui: &mut egui::Ui, state: &State, bus: &mut Bus) {
         let playing = state.playback.playing.is_some();
         for (text, action) in [
-            ("⏮", "To the start"),
-            ("⏪", "Previous key"),
-            (if playing { "⏸" } else { "▶" }, "Play"),
-            ("⏩", "Next key"),
-            ("⏭", "To the end"),
+            ("⇤", "To the start"),
+            ("◂◆", "Previous key"),
+            (if playing { "║" } else { "▶" }, "Play"),
+            ("◆▸", "Next key"),
+            ("⇥", "To the end"),
         ] {
             button(ui, text, action, state, bus);
         }
         let mut frame = state.frame_at(state.time);
         let decimals = usize::from((frame - frame.round()).abs() > 1e-6);
-        let field = DragValue::new(&mut frame).max_decimals(decimals).prefix("frame ");
+        let field =
+            DragValue::new(&mut frame).max_decimals(decimals).prefix("frame ").update_while_editing(false);
         if ui.add(field).on_hover_text("Frame: drag, or click and type").accessible_name("Frame").changed() {
             bus.send(Command::SetTime(state.time_of(frame)));
         }
@@ -59,8 +60,20 @@ impl Header {
     fn range(&self, ui: &mut egui::Ui, state: &State, bus: &mut Bus) {
         let range = state.active().range;
         let (mut first, mut last) = (state.frame_at(range.start), state.frame_at(range.end));
-        let a = ui.add(DragValue::new(&mut first).max_decimals(2).range(f64::MIN..=last).prefix("from "));
-        let b = ui.add(DragValue::new(&mut last).max_decimals(2).range(first..=f64::MAX).prefix("to "));
+        let a = ui.add(
+            DragValue::new(&mut first)
+                .max_decimals(2)
+                .range(f64::MIN..=last)
+                .prefix("from ")
+                .update_while_editing(false),
+        );
+        let b = ui.add(
+            DragValue::new(&mut last)
+                .max_decimals(2)
+                .range(first..=f64::MAX)
+                .prefix("to ")
+                .update_while_editing(false),
+        );
         let (a, b) = (a.accessible_name("First frame"), b.accessible_name("Last frame"));
         let range = Range { start: state.time_of(first), end: state.time_of(last) };
         gesture(&(a | b), "Range", Edit::SetRange(range), state, bus);
@@ -144,15 +157,15 @@ fn clips(ui: &mut egui::Ui, state: &State, bus: &mut Bus) {
             }
         }
     });
-    shown.response.on_hover_text("The clip that is edited").accessible_name("Clip");
+    shown.response.on_hover_text("The clip that is edited").accessible_name("Clip to edit");
 }
 
 fn auto_key(ui: &mut egui::Ui, state: &State, bus: &mut Bus) {
     let on = state.auto_key;
     let (text, fill) = if on {
-        (RichText::new("⏺ AUTO-KEY").color(Color32::WHITE).strong(), Color32::from_rgb(200, 30, 30))
+        (RichText::new("● AUTO-KEY").color(Color32::WHITE).strong(), Color32::from_rgb(200, 30, 30))
     } else {
-        (RichText::new("⏺ auto-key"), Color32::TRANSPARENT)
+        (RichText::new("● auto-key"), Color32::TRANSPARENT)
     };
     let response = ui.add(egui::Button::new(text).fill(fill).selected(on));
     if response.on_hover_text(named("Automatic keys").help).accessible_name("Automatic keys").clicked() {

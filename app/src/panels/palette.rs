@@ -19,9 +19,9 @@ impl Palette {
         self.open
     }
 
-    /// Open it, empty.
-    pub fn show(&mut self) {
-        *self = Self { open: true, ..Self::default() };
+    /// Open it on what a text finds.
+    pub fn show(&mut self, text: &str) {
+        *self = Self { open: true, text: text.into(), at: 0 };
     }
 
     /// Draw it over the panes.

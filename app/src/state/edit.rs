@@ -1,6 +1,6 @@
 //! Edits: what changes the document. Each says what it is called, for the menu.
 
-use super::{EditClip, Marker, Selection, State};
+use super::{EditClip, Marker, State};
 use glam::{Quat, Vec3};
 use sinew::clip::{Clip, CurveError, Interpolation};
 use sinew::skeleton::BoneId;
@@ -79,6 +79,8 @@ pub enum Edit {
     RenameClip(String),
     /// The clip, without the last.
     DeleteClip,
+    /// Left does what right did, all through the clip.
+    MirrorClip,
     /// All clips anew, for example baked; the edit is called by the name given.
     ReplaceClips(&'static str, Vec<Clip>),
 }
@@ -140,6 +142,7 @@ impl Edit {
             Self::NewClip(_) => "New clip",
             Self::RenameClip(_) => "Rename clip",
             Self::DeleteClip => "Delete clip",
+            Self::MirrorClip => "Mirror clip",
             Self::ReplaceClips(name, _) => name,
         }
     }
@@ -179,6 +182,13 @@ impl Edit {
                 state.show_clip(state.clip.min(state.document.clips.len() - 1));
                 Ok(())
             }
+            Self::MirrorClip => {
+                let character = &state.document.asset.character;
+                let image = state.active().to_clip().mirrored(character.skeleton(), &character.mirror());
+                state.active_mut().tracks = image.tracks.into_iter().map(Arc::new).collect();
+                state.selected().keys.clear();
+                Ok(())
+            }
             Self::ReplaceClips(_, clips) => state.replace_clips(&clips),
         }
     }
@@ -187,8 +197,7 @@ impl Edit {
 impl State {
     fn show_clip(&mut self, clip: usize) {
         self.clip = clip;
-        self.selection =
-            Selection { bones: std::mem::take(&mut self.selection.bones), ..Selection::default() };
+        self.selected().keys.clear();
         self.loose.clear();
         self.playback.range = self.active().range;
     }

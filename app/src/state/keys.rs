@@ -13,7 +13,7 @@ impl State {
     /// The selected keys, to be replaced by what became of them.
     fn take_keys(&mut self) -> Result<Keys, Refused> {
         self.trim_selection();
-        let keys = std::mem::take(&mut self.selection.keys);
+        let keys = std::mem::take(&mut self.selected().keys);
         if keys.is_empty() { Err(Refused::NoKeys) } else { Ok(keys) }
     }
 
@@ -22,7 +22,7 @@ impl State {
     }
 
     fn reselect(&mut self, track: u32, places: Vec<usize>, mask: u8) {
-        self.selection.keys.insert(track, TrackKeys { spans: Spans::from_indices(places), mask });
+        self.selected().keys.insert(track, TrackKeys { spans: Spans::from_indices(places), mask });
     }
 
     pub(super) fn delete_keys(&mut self) -> Result<(), Refused> {
@@ -101,7 +101,7 @@ impl State {
             copied.iter().map(|t| t.curve.times()[0]).reduce(f64::min).ok_or(Refused::NothingCopied)?;
         let offset = self.key_time(self.time) - first;
         let snapping = Snap::of(self);
-        self.selection.keys.clear();
+        self.selected().keys.clear();
         for Track { target, curve } in copied {
             let by = Retime { scale: 1.0, offset, snap: &|t| snapping.time(t) };
             let moved = curve.retimed(|_| true, &by)?.0;

@@ -101,7 +101,7 @@ pub struct State {
     /// The clip being edited.
     pub clip: usize,
     /// What commands act upon.
-    pub selection: Selection,
+    pub selection: Arc<Selection>,
     /// The playhead, seconds.
     pub time: f64,
     /// Whether and how it runs.
@@ -130,7 +130,7 @@ struct Step {
     name: String,
     document: Document,
     clip: usize,
-    selection: Selection,
+    selection: Arc<Selection>,
     loose: BTreeMap<BoneId, Loose>,
 }
 
@@ -192,7 +192,7 @@ impl State {
             saved: document.clone(),
             document,
             clip: 0,
-            selection: Selection::default(),
+            selection: Arc::default(),
             time: 0.0,
             playback,
             view: View::default(),
@@ -257,10 +257,10 @@ impl State {
             Command::SelectBones(bones, mode) => {
                 let count = self.document.skeleton().len();
                 let bones: Vec<_> = bones.into_iter().filter(|b| b.index() < count).collect();
-                self.selection.choose_bones(&bones, mode);
+                self.selected().choose_bones(&bones, mode);
             }
             Command::SelectKeys(keys, mode) => {
-                self.selection.choose_keys(keys, mode);
+                self.selected().choose_keys(keys, mode);
                 self.trim_selection();
             }
             Command::SelectClip(clip) => self.select_clip(clip)?,
@@ -282,6 +282,11 @@ impl State {
     /// To be changed: shared tracks stay shared.
     fn active_mut(&mut self) -> &mut EditClip {
         Arc::make_mut(&mut self.document.clips[self.clip])
+    }
+
+    /// To be changed: the steps of undo share it.
+    fn selected(&mut self) -> &mut Selection {
+        Arc::make_mut(&mut self.selection)
     }
 
     /// What the next undo takes back.
@@ -334,7 +339,7 @@ impl State {
         }
         self.commit();
         self.clip = clip;
-        self.selection.keys.clear();
+        self.selected().keys.clear();
         self.loose.clear();
         self.playback.range = self.active().range;
         self.time = self.time.clamp(self.playback.range.start, self.playback.range.end);
@@ -393,7 +398,7 @@ impl State {
     /// Drop what the selection names and the clip no longer has.
     fn trim_selection(&mut self) {
         let clip = &self.document.clips[self.clip];
-        self.selection.keys.retain(|&track, keys| {
+        Arc::make_mut(&mut self.selection).keys.retain(|&track, keys| {
             let count = clip.tracks.get(track as usize).map_or(0, |t| t.curve.times().len());
             keys.spans = keys.spans.below(count);
             !keys.spans.is_empty()

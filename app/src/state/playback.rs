@@ -103,7 +103,7 @@ impl State {
         if !t.is_finite() {
             return;
         }
-        self.time = if self.snap { self.snapped(t) } else { t.clamp(-FAR, FAR) };
+        self.time = t.clamp(-FAR, FAR);
         if self.playback.playing.is_some() {
             self.playback.playing = Some(self.time - self.playback.range.start);
         }

@@ -132,7 +132,19 @@ impl State {
         let changes = self.clipboard.pose.clone();
         match mirror {
             Mirror::No => self.apply_pose(&changes),
-            Mirror::ByName => Err(Refused::Bad("mirrored poses are not there yet".into())),
+            Mirror::ByName => {
+                let mirror = self.document.asset.character.mirror();
+                let image = |(b, c): (BoneId, Change)| {
+                    let change = match c {
+                        Change::Rotation(q) => Change::Rotation(mirror.rotation(b, q)),
+                        Change::Translation(v) => Change::Translation(mirror.translation(b, v)),
+                        Change::Scale(v) => Change::Scale(mirror.scale(b, v)),
+                        Change::Xzx(theta) => Change::Xzx(mirror.xzx(b, theta, None)),
+                    };
+                    (mirror.pair(b), change)
+                };
+                self.apply_pose(&changes.into_iter().map(image).collect::<Vec<_>>())
+            }
         }
     }
 
@@ -165,7 +177,7 @@ impl State {
     /// `wanted` is true of rotations, and of translations of roots.
     fn key_bones(&mut self, bones: &[BoneId], fresh: &dyn Fn(bool, bool) -> bool) -> Result<(), Refused> {
         let (pose, keyed) = (self.pose(), self.pose_at(self.time));
-        self.selection.keys = Keys::new();
+        self.selected().keys = Keys::new();
         for &bone in bones {
             let local = pose.locals[bone.index()];
             let (theta, root) = (self.theta(bone), self.document.skeleton().parent(bone).is_none());
@@ -210,7 +222,7 @@ impl State {
             self.active_mut().tracks.push(Arc::new(Track { target, curve }));
             let track = self.active().tracks.len() as u32 - 1;
             let keys = TrackKeys { spans: Spans::one(0..1), mask: u8::MAX };
-            self.selection.keys.insert(track, keys);
+            self.selected().keys.insert(track, keys);
         }
         Ok(())
     }
@@ -220,7 +232,7 @@ impl State {
         let curve = self.active().tracks[track].curve.with_key(at, value)?;
         let keys = TrackKeys { spans: Spans::from_indices(curve.key_at(at)), mask: u8::MAX };
         self.set_curve(track, curve);
-        self.selection.keys.insert(track as u32, keys);
+        self.selected().keys.insert(track as u32, keys);
         Ok(())
     }
 }

@@ -40,6 +40,12 @@ impl Spans {
         self.0.get(at).is_some_and(|r| r.start as usize <= i)
     }
 
+    /// Whether any of a run is among them.
+    pub fn meets(&self, run: Range<usize>) -> bool {
+        let at = self.0.partition_point(|r| r.end as usize <= run.start);
+        self.0.get(at).is_some_and(|r| (r.start as usize) < run.end)
+    }
+
     /// How many indices.
     pub fn len(&self) -> usize {
         self.0.iter().map(|r| r.len()).sum()
