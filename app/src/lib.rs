@@ -8,6 +8,7 @@
 pub mod commands;
 pub mod jobs;
 pub mod layout;
+pub mod paint;
 pub mod panels;
 pub mod state;
 pub mod viewport;
