@@ -1,7 +1,7 @@
 //! Which form the result has: glTF with quaternions, or a rig of ours with angles.
 
 use crate::cli::Failure;
-use sinew::bake::{self, BakeDesc, BakeError, Baked, xzx};
+use sinew::bake::{self, BakeDesc, BakeError, Baked, Watch, xzx};
 use sinew::character::Character;
 use sinew::clip::{Clip, Target};
 use std::path::Path;
@@ -52,11 +52,16 @@ pub(super) fn bake(
     character: &Character,
     clip: &Clip,
     desc: &BakeDesc,
+    watch: Watch,
 ) -> Result<Baked, BakeError> {
     let has = |of: fn(&Target) -> bool| clip.tracks.iter().any(|t| of(&t.target));
     match form {
-        Form::Xzx if has(|t| matches!(t, Target::Rotation(_))) => xzx::to_xzx(character, clip, desc),
-        Form::Quat if has(|t| matches!(t, Target::Xzx(_))) => xzx::to_quat(character, clip, desc),
-        _ => bake::bake(character, clip, desc),
+        Form::Xzx if has(|t| matches!(t, Target::Rotation(_))) => {
+            xzx::convert(character, clip, desc, xzx::Form::Angles, watch)
+        }
+        Form::Quat if has(|t| matches!(t, Target::Xzx(_))) => {
+            xzx::convert(character, clip, desc, xzx::Form::Quaternions, watch)
+        }
+        _ => bake::bake_watched(character, clip, desc, watch),
     }
 }
