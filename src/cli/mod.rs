@@ -190,7 +190,7 @@ fn load_posed(path: &Path, poses: Option<&PathBuf>, options: Options, say: &Say)
                 &"a motion capture stands on a skeleton of its own; expected poses (`sinew_poses`)",
             ));
         }
-        let clips = io::rig_json::poses_from_bytes(&bytes, import.asset.character.skeleton());
+        let clips = io::rig_json::poses_from_bytes(&bytes, &import.asset.character);
         let clips = clips.map_err(|e| bad(&e))?;
         let character = std::mem::take(&mut import.asset.character);
         import.asset.character = character.with_clips(clips).map_err(|e| bad(&e))?;

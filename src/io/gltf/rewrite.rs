@@ -69,7 +69,7 @@ pub fn with_clips(
     json.insert("animations".into(), carried::kept(&old, clips).into());
     drop_accessors(&mut json, &old);
     let mut out = Rewritten { bin: repack(&mut json, &doc), json };
-    out.animate(import, clips, &old)?;
+    out.animate(&Places::of(import), clips, &old)?;
     out.json.entry("asset").or_insert(json!({"version": "2.0"}));
     let asset =
         out.json["asset"].as_object_mut().ok_or_else(|| value("asset", "an object", "something else"))?;
@@ -96,14 +96,7 @@ impl Rewritten {
                 continue;
             }
             let bytes = source.read(&place)?;
-            let view = list(&mut self.json, "bufferViews").len();
-            self.bin.resize(self.bin.len().next_multiple_of(8), 0);
-            let range = json!({"buffer": 0, "byteOffset": self.bin.len(), "byteLength": bytes.len()});
-            list(&mut self.json, "bufferViews").push(range);
-            self.bin.extend(&bytes);
-            if list(&mut self.json, "buffers").is_empty() {
-                list(&mut self.json, "buffers").push(json!({}));
-            }
+            let view = self.view(&bytes);
             if let Some(image) = self.json["images"][i].as_object_mut() {
                 image.remove("uri");
                 image.insert("bufferView".into(), view.into());
@@ -111,6 +104,45 @@ impl Rewritten {
             }
         }
         Ok(())
+    }
+
+    /// An entry of one of the file's lists; its index.
+    pub(super) fn push(&mut self, name: &str, item: Value) -> usize {
+        let list = list(&mut self.json, name);
+        list.push(item);
+        list.len() - 1
+    }
+
+    /// A buffer view of its own for bytes.
+    pub(super) fn view(&mut self, bytes: &[u8]) -> usize {
+        self.bin.resize(self.bin.len().next_multiple_of(8), 0);
+        let range = json!({"buffer": 0, "byteOffset": self.bin.len(), "byteLength": bytes.len()});
+        self.bin.extend(bytes);
+        if list(&mut self.json, "buffers").is_empty() {
+            self.push("buffers", json!({}));
+        }
+        self.push("bufferViews", range)
+    }
+
+    /// An accessor of all of a view of its own.
+    pub(super) fn accessor(&mut self, bytes: &[u8], mut accessor: Value) -> usize {
+        accessor["bufferView"] = self.view(bytes).into();
+        self.push("accessors", accessor)
+    }
+
+    /// Floats, `width` an element; with the smallest and largest of each component where they are asked for.
+    pub(super) fn floats(&mut self, values: &[f32], kind: &str, width: usize, bounds: bool) -> usize {
+        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let mut accessor = json!({"componentType": 5126, "count": values.len() / width, "type": kind});
+        if bounds {
+            let column = |c: usize| values.iter().skip(c).step_by(width).copied();
+            let of = |least: f32, f: fn(f32, f32) -> f32| {
+                (0..width).map(|c| column(c).fold(least, f)).collect::<Vec<_>>()
+            };
+            (accessor["min"], accessor["max"]) =
+                (json!(of(f32::INFINITY, f32::min)), json!(of(f32::NEG_INFINITY, f32::max)));
+        }
+        self.accessor(&bytes, accessor)
     }
 
     /// As one GLB.
@@ -153,7 +185,7 @@ impl Rewritten {
     }
 
     /// Add the clips and their keys.
-    fn animate(&mut self, import: &Import, clips: &[NewClip], old: &Value) -> Result<()> {
+    pub(super) fn animate(&mut self, places: &Places, clips: &[NewClip], old: &Value) -> Result<()> {
         let (mut keys, mut animations) = (Keys::default(), vec![]);
         let kept = self.json.remove("animations").unwrap_or_default();
         if clips.is_empty() {
@@ -169,7 +201,7 @@ impl Rewritten {
             });
             for (i, track) in new.clip.tracks.iter().enumerate() {
                 let mut sampler = keys.sampler(track, new.short.get(i) == Some(&true), first)?;
-                for (node, path) in targets(import, &track.target)? {
+                for (node, path) in places.targets(&track.target)? {
                     let [mut channel, beside] = carried::beside(before, node, path);
                     channel.insert("sampler".into(), samplers.len().into());
                     let target = channel.entry("target").or_insert(json!({}));
@@ -178,6 +210,10 @@ impl Rewritten {
                     beside.into_iter().for_each(|(key, value)| sampler[key] = value);
                 }
                 samplers.push(sampler);
+            }
+            if channels.is_empty() {
+                // An animation of nothing is against the specification.
+                continue;
             }
             (animation["samplers"], animation["channels"]) = (samplers.into(), channels.into());
             animations.push(animation);
@@ -213,7 +249,7 @@ impl Rewritten {
 }
 
 /// What kind of picture bytes are.
-fn mime(bytes: &[u8]) -> &'static str {
+pub(super) fn mime(bytes: &[u8]) -> &'static str {
     let heads: [(&[u8], &str); 3] =
         [(b"\xff\xd8", "image/jpeg"), (b"RIFF", "image/webp"), (b"\xabKTX", "image/ktx2")];
     heads.into_iter().find(|h| bytes.starts_with(h.0)).map_or("image/png", |h| h.1)
@@ -228,27 +264,43 @@ pub(super) fn list<'j>(json: &'j mut Map<String, Value>, name: &str) -> &'j mut 
     entry.as_array_mut().expect("just made")
 }
 
-/// Nodes and the property that a track moves.
-fn targets(import: &Import, target: &Target) -> Result<Vec<(u32, &'static str)>> {
-    let (bone, path) = match target {
-        Target::Translation(b) => (b, "translation"),
-        Target::Rotation(b) => (b, "rotation"),
-        Target::Scale(b) => (b, "scale"),
-        Target::Xzx(b) => {
-            let found = format!("angles of bone {}", b.0);
-            return Err(value("a clip", "rotations", found));
-        }
-        Target::Weights { first } => {
-            let of = import.asset.character.instances().iter().zip(&import.primitives);
-            let mut nodes: Vec<u32> =
-                of.filter(|(i, _)| i.first_weight == *first).map(|(_, p)| p.node).collect();
-            nodes.dedup();
-            return Ok(nodes.into_iter().map(|n| (n, "weights")).collect());
-        }
-    };
-    let node = import.nodes.get(bone.index()).copied().filter(|&n| n != u32::MAX);
-    let missing = || value("a clip", "bones that are nodes of the file", format!("bone {}", bone.0));
-    Ok(vec![(node.ok_or_else(missing)?, path)])
+/// The nodes that tracks move.
+pub(super) struct Places {
+    /// Of each bone; `u32::MAX` for one that is no node.
+    pub bones: Vec<u32>,
+    /// First morph weight of a run, and a node that it morphs.
+    pub weights: Vec<(usize, u32)>,
+}
+
+impl Places {
+    fn of(import: &Import) -> Self {
+        let character = &import.asset.character;
+        let instances = character.instances().iter().zip(&import.primitives);
+        let morphed = instances.filter(|(i, _)| !character.mesh(i).targets.is_empty());
+        let mut weights: Vec<(usize, u32)> = morphed.map(|(i, p)| (i.first_weight, p.node)).collect();
+        weights.dedup();
+        Self { bones: import.nodes.clone(), weights }
+    }
+
+    /// Nodes and the property that a track moves.
+    fn targets(&self, target: &Target) -> Result<Vec<(u32, &'static str)>> {
+        let (bone, path) = match target {
+            Target::Translation(b) => (b, "translation"),
+            Target::Rotation(b) => (b, "rotation"),
+            Target::Scale(b) => (b, "scale"),
+            Target::Xzx(b) => {
+                let found = format!("angles of bone {}", b.0);
+                return Err(value("a clip", "rotations", found));
+            }
+            Target::Weights { first } => {
+                let of = self.weights.iter().filter(|w| w.0 == *first);
+                return Ok(of.map(|w| (w.1, "weights")).collect());
+            }
+        };
+        let node = self.bones.get(bone.index()).copied().filter(|&n| n != u32::MAX);
+        let missing = || value("a clip", "bones that are nodes of the file", format!("bone {}", bone.0));
+        Ok(vec![(node.ok_or_else(missing)?, path)])
+    }
 }
 
 /// Keys of all clips: accessors, and the bytes of those with four-byte and with two-byte numbers.
