@@ -26,10 +26,12 @@ mod textures;
 mod triangles;
 mod uri;
 mod warnings;
+mod wear;
 mod write;
 
 pub use error::GltfError;
 pub use rewrite::{NewClip, Rewritten, with_clips};
+pub use wear::wear;
 pub use write::write;
 
 use super::{Import, Options};

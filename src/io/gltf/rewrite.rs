@@ -385,7 +385,7 @@ fn increasing(times: &[f64]) -> Vec<f32> {
 }
 
 /// The primitives of all meshes.
-fn primitives(json: &mut Map<String, Value>) -> impl Iterator<Item = &mut Value> {
+pub(super) fn primitives(json: &mut Map<String, Value>) -> impl Iterator<Item = &mut Value> {
     let meshes = json.get_mut("meshes").and_then(Value::as_array_mut).into_iter().flatten();
     meshes.filter_map(|m| m.get_mut("primitives")?.as_array_mut()).flatten()
 }
