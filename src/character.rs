@@ -239,6 +239,20 @@ impl Character {
         runs
     }
 
+    /// The bone that moves a vertex of an instance most; `None` where none does.
+    ///
+    /// # Panics
+    /// If there is no such instance or vertex.
+    pub fn main_bone(&self, instance: usize, vertex: usize) -> Option<BoneId> {
+        match &self.instances[instance].binding {
+            Binding::Bone(b) => Some(*b),
+            Binding::Skin { palette, weights } => {
+                let most = weights.of(vertex).max_by(|a, b| a.1.total_cmp(&b.1));
+                most.filter(|m| m.1 > 0.0).map(|m| palette[m.0].0)
+            }
+        }
+    }
+
     /// For each morph weight, how far it moves a vertex at most, metres in the mesh's frame.
     pub fn target_reach(&self) -> Vec<f64> {
         let mut reach = vec![0.0_f64; self.rest_weights.len()];

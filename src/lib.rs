@@ -33,6 +33,9 @@
 //! # Ok::<(), sinew::skeleton::SkeletonError>(())
 //! ```
 //!
+//! **Dragged to a place**, a hand pulls its arm along ([`ik`]): bones turn within their limits until a point of the body is where it is
+//! wanted; [`pose::mirror`] gives the other hand the same.
+//!
 //! **A clip turns a time into a pose.** Its curves hold, run straight or follow Catmull-Rom; seconds are `f64`:
 //!
 //! ```
@@ -103,6 +106,8 @@ pub mod pose;
 pub mod clip;
 
 pub mod fk;
+
+pub mod ik;
 
 pub mod mesh;
 

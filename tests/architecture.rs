@@ -12,6 +12,8 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("pose", &["math", "skeleton"]),
     ("clip", &["math", "time", "skeleton", "pose"]),
     ("fk", &["math", "skeleton", "pose"]),
+    // Goals to poses: asks where bones stand, and knows nothing of what hangs on them.
+    ("ik", &["math", "skeleton", "pose", "fk"]),
     ("mesh", &["math"]),
     // Neither skeleton nor pose: whatever has matrices can drive a mesh.
     ("skin", &["math", "mesh"]),

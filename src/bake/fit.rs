@@ -27,8 +27,11 @@ pub(super) struct Samples {
     pub own: Vec<usize>,
 }
 
-/// Between two keys of a cubic, so many samples; more where the keys are far apart in time.
+/// Parts between two keys of a cubic, at whose ends samples are taken.
 const CUBIC_STEPS: usize = 8;
+
+/// And between two of a straight piece: fitted cubics bulge between samples.
+const STRAIGHT_STEPS: usize = 4;
 
 impl Samples {
     /// Of a curve: its keys, and points between them.
@@ -65,12 +68,15 @@ impl Samples {
                 self.times.push(to);
                 self.values.extend(held);
             }
-            Interpolation::Linear => self.push(curve, 0.5 * (from + to)),
+            Interpolation::Linear => self.spread(curve, from, to, STRAIGHT_STEPS),
             Interpolation::CatmullRom(_) | Interpolation::Hermite => {
-                (1..CUBIC_STEPS)
-                    .for_each(|i| self.push(curve, from + (to - from) * i as f64 / CUBIC_STEPS as f64));
+                self.spread(curve, from, to, CUBIC_STEPS);
             }
         }
+    }
+
+    fn spread(&mut self, curve: &Curve, from: f64, to: f64, steps: usize) {
+        (1..steps).for_each(|i| self.push(curve, from + (to - from) * i as f64 / steps as f64));
     }
 
     fn push(&mut self, curve: &Curve, t: f64) {

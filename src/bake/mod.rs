@@ -17,7 +17,7 @@ mod tests;
 mod times;
 pub mod xzx;
 
-pub use gauge::{Gauge, Lever, Looks, Metric, Spot, Watch, Worst};
+pub use gauge::{Gauge, Lever, Looks, Metric, Spot, Stage, Watch, Worst};
 pub use pack::{PackedBake, pack};
 
 use crate::character::Character;
@@ -206,7 +206,7 @@ const SEAM: f64 = 1e-3;
 /// # Panics
 /// If the clip is not of the character.
 pub fn bake(character: &Character, clip: &Clip, desc: &BakeDesc) -> Result<Baked, BakeError> {
-    bake_watched(character, clip, desc, &|_| {})
+    bake_watched(character, clip, desc, &|_, _| {})
 }
 
 /// The same, and tell how many poses were compared as it goes.
@@ -223,11 +223,12 @@ pub fn bake_watched(
     watch: Watch,
 ) -> Result<Baked, BakeError> {
     check(character, clip, desc)?;
-    let gauge = Gauge::of(character, desc).watched(watch);
+    let mut gauge = Gauge::of(character, desc).watched(watch);
     let start = start(clip, desc, desc.fps)?;
     let mut plan = Plan::new(character, clip, &start, &gauge, desc);
+    gauge.enter(Stage::Search);
     let mut baked = plan.search(&gauge);
-    let mut share = 1.0;
+    gauge.enter(Stage::Check);
     for _ in 0..8 {
         let Verdict { worst, ceiling, moments } = times::verify(&gauge, clip, &baked.clip);
         let report = &mut baked.report;
@@ -237,8 +238,7 @@ pub fn bake_watched(
         }
         // What hid between the moments of the search: aim a little lower.
         let over = if worst.share() > 1.0 { worst.share() } else { ceiling };
-        share *= (0.95 / over).min(0.9);
-        baked = plan.within(share);
+        baked = plan.within((0.95 / over).min(0.9));
     }
     let plain = plan.untouched();
     let Verdict { worst, ceiling, moments } = times::verify(&gauge, clip, &plain.clip);

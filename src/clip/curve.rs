@@ -22,10 +22,10 @@ pub enum Interpolation {
 /// `K` keys of `width` numbers each.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
-    times: Vec<f64>,
-    values: Vec<f32>,
-    width: usize,
-    interpolation: Interpolation,
+    pub(super) times: Vec<f64>,
+    pub(super) values: Vec<f32>,
+    pub(super) width: usize,
+    pub(super) interpolation: Interpolation,
 }
 
 /// Why keys make no curve.

@@ -1,10 +1,12 @@
 //! Clips: tracks of keys that turn a time into a pose.
 
 mod curve;
+mod edit;
 mod mirror;
 pub(crate) mod packed;
 
 pub use curve::{Curve, CurveError, Interpolation};
+pub use edit::Retime;
 pub use packed::{Packed, PackedError};
 
 use crate::pose::Pose;
@@ -37,6 +39,47 @@ pub struct Track {
     pub target: Target,
     /// How.
     pub curve: Curve,
+}
+
+impl Target {
+    /// The bone, if it moves one.
+    pub fn bone(&self) -> Option<BoneId> {
+        match *self {
+            Self::Xzx(b) | Self::Rotation(b) | Self::Translation(b) | Self::Scale(b) => Some(b),
+            Self::Weights { .. } => None,
+        }
+    }
+}
+
+impl Track {
+    /// Write this one channel at time `t` (seconds) over `pose`; the ends hold outside its keys.
+    ///
+    /// # Panics
+    /// If its bone or run of weights is not in `pose`.
+    pub fn sample(&self, skeleton: &Skeleton, t: f64, pose: &mut Pose) {
+        let mut v = [0.0_f32; 4];
+        match self.target {
+            Target::Xzx(bone) => {
+                self.curve.sample(t, &mut v[..3]);
+                pose.set_xzx(skeleton, bone, Vec3::new(v[0], v[1], v[2]));
+            }
+            Target::Rotation(bone) => {
+                pose.locals[bone.index()].rotation = self.curve.sample_rotation(t);
+            }
+            Target::Translation(bone) => {
+                self.curve.sample(t, &mut v[..3]);
+                pose.locals[bone.index()].translation = Vec3::new(v[0], v[1], v[2]);
+            }
+            Target::Scale(bone) => {
+                self.curve.sample(t, &mut v[..3]);
+                pose.locals[bone.index()].scale = Vec3::new(v[0], v[1], v[2]);
+            }
+            Target::Weights { first } => {
+                let run = first..first + self.curve.width();
+                self.curve.sample(t, &mut pose.weights[run]);
+            }
+        }
+    }
 }
 
 /// A named animation: tracks that start from the rest pose.
@@ -73,29 +116,8 @@ impl Clip {
     /// # Panics
     /// If a track's bone or run of weights is not in `pose`; `Character::new` checks both.
     pub fn sample(&self, skeleton: &Skeleton, t: f64, pose: &mut Pose) {
-        let mut v = [0.0_f32; 4];
         for track in &self.tracks {
-            match track.target {
-                Target::Xzx(bone) => {
-                    track.curve.sample(t, &mut v[..3]);
-                    pose.set_xzx(skeleton, bone, Vec3::new(v[0], v[1], v[2]));
-                }
-                Target::Rotation(bone) => {
-                    pose.locals[bone.index()].rotation = track.curve.sample_rotation(t);
-                }
-                Target::Translation(bone) => {
-                    track.curve.sample(t, &mut v[..3]);
-                    pose.locals[bone.index()].translation = Vec3::new(v[0], v[1], v[2]);
-                }
-                Target::Scale(bone) => {
-                    track.curve.sample(t, &mut v[..3]);
-                    pose.locals[bone.index()].scale = Vec3::new(v[0], v[1], v[2]);
-                }
-                Target::Weights { first } => {
-                    let run = first..first + track.curve.width();
-                    track.curve.sample(t, &mut pose.weights[run]);
-                }
-            }
+            track.sample(skeleton, t, pose);
         }
     }
 }

@@ -5,6 +5,7 @@ mod channels;
 mod effects;
 mod fit;
 mod framing;
+mod live;
 mod look;
 mod onion;
 mod ordered;
@@ -18,6 +19,7 @@ mod worker;
 
 pub use channels::Extent;
 pub use framing::{Framing, Turns};
+pub use live::Live;
 pub use look::{GroundLook, Look, Shading, Shadows};
 pub use ordered::{Stop, in_order, in_order_pairs};
 pub use overlay::{BonesDesc, Onion, Overlays, PathDesc};

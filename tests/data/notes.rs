@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec3};
 use sinew::character::{Binding, Character, Scratch};
+use sinew::ik;
 use sinew::io::{self, Import, Options, notes};
 use sinew::skeleton::BoneId;
 use sinew::skin::{Deformed, bind_closest};
@@ -40,6 +41,15 @@ pub fn the_robot_arm_is_where_it_should_be(data: &Path) -> Result<(), String> {
     };
     near("tip at 2.25 s", tip(2.25), [-0.311443419, 0.612340011, 0.146661247], 1e-6)?;
     near("tip at 3 s", tip(3.0), [0.029054939, 0.694882203, 0.168905313], 1e-6)?;
+
+    // From rest the arm reaches for the same place.
+    let (mut pose, target) = (c.rest_pose(), [-0.311443419, 0.612340011, 0.146661247]);
+    let point = c.skeleton().tip(BoneId(6));
+    let goal = ik::Goal { bone: BoneId(6), point, target: DVec3::from_array(target) };
+    let bones = ik::chain(c.skeleton(), BoneId(6), 6);
+    let found = ik::solve(c.skeleton(), &mut pose, &bones, &[goal], &ik::Settings::default());
+    let reached = c.posed(&pose).world_from_bone(BoneId(6)).transform_point3(point.as_dvec3());
+    near(&format!("tip pulled: {found:?}"), reached, target, 2e-6)?;
     let v = vertices(c, Some(0), 3.0);
     let mean = v.iter().sum::<DVec3>() / v.len() as f64;
     near("mean vertex at 3 s", mean, [0.017175659, 0.507363362, 0.106344036], 1e-6)

@@ -6,6 +6,8 @@
 mod accessor;
 mod attributes;
 mod bake;
+mod beside;
+mod carried;
 mod clips;
 mod compressed;
 mod container;

@@ -1,5 +1,6 @@
 //! A glTF file with other clips: everything else is carried through, byte for byte where it is binary.
 
+use super::carried;
 use super::container;
 use super::document::Document;
 use super::error::{Result, value};
@@ -33,7 +34,8 @@ pub struct Rewritten {
 }
 
 /// Extensions that name accessors in places that are not known here keep every accessor alive.
-const HARMLESS: [&str; 9] = [
+const HARMLESS: [&str; 10] = [
+    "KHR_animation_pointer",
     "KHR_materials_",
     "KHR_texture_",
     "EXT_texture_",
@@ -63,6 +65,8 @@ pub fn with_clips(
     let mut json: Map<String, Value> =
         serde_json::from_slice(parts.json).map_err(|e| value("the JSON", "an object", e.to_string()))?;
     let old = json.remove("animations").unwrap_or_default();
+    // Channels that nobody here can play keep their keys.
+    json.insert("animations".into(), carried::kept(&old, clips).into());
     drop_accessors(&mut json, &old);
     let mut out = Rewritten { bin: repack(&mut json, &doc), json };
     out.animate(&Places::of(import), clips, &old)?;
@@ -182,16 +186,28 @@ impl Rewritten {
 
     /// Add the clips and their keys.
     pub(super) fn animate(&mut self, places: &Places, clips: &[NewClip], old: &Value) -> Result<()> {
-        let mut keys = Keys::default();
-        let mut animations = vec![];
-        for new in clips {
-            let mut animation = new.replaces.map_or(json!({}), |i| old[i].clone());
+        let (mut keys, mut animations) = (Keys::default(), vec![]);
+        let kept = self.json.remove("animations").unwrap_or_default();
+        if clips.is_empty() {
+            return Ok(());
+        }
+        let first = list(&mut self.json, "accessors").len();
+        for (c, new) in clips.iter().enumerate() {
+            let (mut animation, before) = (kept[c].clone(), new.replaces.map_or(&Value::Null, |i| &old[i]));
             animation["name"] = new.clip.name.clone().into();
-            let (mut samplers, mut channels) = (vec![], vec![]);
+            let [mut samplers, mut channels] = ["samplers", "channels"].map(|k| match animation[k].take() {
+                Value::Array(list) => list,
+                _ => vec![],
+            });
             for (i, track) in new.clip.tracks.iter().enumerate() {
-                let sampler = keys.sampler(track, new.short.get(i) == Some(&true))?;
+                let mut sampler = keys.sampler(track, new.short.get(i) == Some(&true), first)?;
                 for (node, path) in places.targets(&track.target)? {
-                    channels.push(json!({"sampler": samplers.len(), "target": {"node": node, "path": path}}));
+                    let [mut channel, beside] = carried::beside(before, node, path);
+                    channel.insert("sampler".into(), samplers.len().into());
+                    let target = channel.entry("target").or_insert(json!({}));
+                    (target["node"], target["path"]) = (node.into(), path.into());
+                    channels.push(channel.into());
+                    beside.into_iter().for_each(|(key, value)| sampler[key] = value);
                 }
                 samplers.push(sampler);
             }
@@ -202,17 +218,13 @@ impl Rewritten {
             (animation["samplers"], animation["channels"]) = (samplers.into(), channels.into());
             animations.push(animation);
         }
-        if animations.is_empty() {
-            return Ok(());
-        }
         self.json.insert("animations".into(), animations.into());
         self.append(keys);
         Ok(())
     }
 
     /// Put the keys behind what is there.
-    fn append(&mut self, keys: Keys) {
-        let accessors = list(&mut self.json, "accessors").len();
+    pub(super) fn append(&mut self, keys: Keys) {
         let views = list(&mut self.json, "bufferViews").len();
         // Four-byte numbers first, so that both parts are aligned.
         self.bin.resize(self.bin.len().next_multiple_of(4), 0);
@@ -233,14 +245,6 @@ impl Rewritten {
         if list(&mut self.json, "buffers").is_empty() {
             list(&mut self.json, "buffers").push(json!({}));
         }
-        for sampler in
-            list(&mut self.json, "animations").iter_mut().flat_map(|a| a["samplers"].as_array_mut()).flatten()
-        {
-            for end in ["input", "output"] {
-                let k = sampler[end].as_u64().unwrap_or(0) as usize;
-                sampler[end] = (accessors + k).into();
-            }
-        }
     }
 }
 
@@ -252,7 +256,7 @@ pub(super) fn mime(bytes: &[u8]) -> &'static str {
 }
 
 /// A list of the file; made if there is none.
-fn list<'j>(json: &'j mut Map<String, Value>, name: &str) -> &'j mut Vec<Value> {
+pub(super) fn list<'j>(json: &'j mut Map<String, Value>, name: &str) -> &'j mut Vec<Value> {
     let entry = json.entry(name).or_insert(Value::Array(vec![]));
     if !entry.is_array() {
         *entry = Value::Array(vec![]);
@@ -301,14 +305,15 @@ impl Places {
 
 /// Keys of all clips: accessors, and the bytes of those with four-byte and with two-byte numbers.
 #[derive(Default)]
-struct Keys {
+pub(super) struct Keys {
     parts: [Vec<u8>; 2],
     accessors: Vec<(Value, usize)>,
     known: BTreeMap<(Vec<u8>, &'static str), usize>,
 }
 
 impl Keys {
-    fn sampler(&mut self, track: &Track, short: bool) -> Result<Value> {
+    /// A sampler of a track, whose accessors will follow `first` others.
+    pub fn sampler(&mut self, track: &Track, short: bool, first: usize) -> Result<Value> {
         let curve = &track.curve;
         let mode = match curve.interpolation() {
             Interpolation::Hold => "STEP",
@@ -330,7 +335,7 @@ impl Keys {
             true => self.shorts(curve.values()),
             false => self.floats(curve.values(), kind, each),
         };
-        let mut sampler = json!({"input": input, "output": output, "interpolation": mode});
+        let mut sampler = json!({"input": first + input, "output": first + output, "interpolation": mode});
         if mode == "LINEAR" {
             sampler.as_object_mut().expect("an object").remove("interpolation");
         }
@@ -390,8 +395,9 @@ pub(super) fn primitives(json: &mut Map<String, Value>) -> impl Iterator<Item = 
     meshes.filter_map(|m| m.get_mut("primitives")?.as_array_mut()).flatten()
 }
 
-/// Call `visit` on every index of an accessor outside of animations.
+/// Call `visit` on every index of an accessor, of animations only in what is kept of them.
 fn accessor_places(json: &mut Map<String, Value>, visit: &mut impl FnMut(&mut Value)) {
+    carried::accessors(json, visit);
     let mut each =
         |v: &mut Value| v.as_object_mut().into_iter().flat_map(|o| o.values_mut()).for_each(&mut *visit);
     for p in primitives(json) {

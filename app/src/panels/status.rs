@@ -1,0 +1,49 @@
+//! The line below: what the last frame cost, and what is selected.
+
+use crate::Bus;
+use crate::state::{Command, Quality, State, View};
+use crate::viewport::Viewport;
+
+/// The line.
+#[derive(Default)]
+pub struct Status {}
+
+impl Status {
+    /// Draw it.
+    pub fn ui(&mut self, ui: &mut egui::Ui, state: &State, viewport: &Viewport, bus: &mut Bus) {
+        ui.horizontal(|ui| {
+            quality(ui, state, bus);
+            ui.separator();
+            let c = viewport.cost;
+            let text = format!(
+                "evaluate {:.2} ms · skin {:.2} ms, {} vertices · draw {:.2} ms, {} triangles, {} pixels",
+                c.evaluate_ms, c.skin_ms, c.vertices, c.draw_ms, c.triangles, c.pixels
+            );
+            ui.label(text).on_hover_text("What the last picture that was drawn anew cost");
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                let clip = state.active();
+                let total: usize = clip.tracks.iter().map(|t| t.curve.times().len()).sum();
+                let (bones, keys) = (state.selection.bones.len(), state.selection.key_count());
+                let unsaved = if state.unsaved() { "unsaved · " } else { "" };
+                ui.label(format!(
+                    "{unsaved}{bones} of {} bones · {keys} of {total} keys",
+                    state.document.skeleton().len()
+                ));
+            });
+        });
+    }
+}
+
+fn quality(ui: &mut egui::Ui, state: &State, bus: &mut Bus) {
+    let mut quality = state.view.quality;
+    for (value, name, help) in [
+        (Quality::Draft, "draft", "Half the pixels each way, plain light: fastest"),
+        (Quality::Normal, "normal", "Every pixel, as while working"),
+        (Quality::Exact, "exact", "As an export draws it: edges smoothed, all lamps; slowest"),
+    ] {
+        ui.selectable_value(&mut quality, value, name).on_hover_text(help);
+    }
+    if quality != state.view.quality {
+        bus.send(Command::SetView(View { quality, ..state.view.clone() }));
+    }
+}
