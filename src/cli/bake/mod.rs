@@ -201,13 +201,11 @@ fn one(
     for e in &edited {
         let desc = BakeDesc { cycle: e.cycle, over: e.over.clone(), ..desc.clone() };
         let poses = AtomicUsize::new(0);
-        let watch = |_: Stage, n: usize| {
+        let watch = |stage: Stage, n: usize| {
             let all = poses.fetch_add(n, Ordering::Relaxed) + n;
-            bar.set_message(format!(
-                "{}, {}: {all} poses compared",
-                input.display(),
-                say::name(&e.clip.name)
-            ));
+            let doing = if stage == Stage::Check { "checking" } else { "searching" };
+            let clip = say::name(&e.clip.name);
+            bar.set_message(format!("{}, {clip}: {doing}, {all} poses compared", input.display()));
         };
         let baked = bake::bake_watched(&import.asset.character, &e.clip, &desc, &watch);
         done.push(Done { edited: e, baked: baked.map_err(failure).map_err(placed)? });
