@@ -1,15 +1,16 @@
 //! Other forms than curves in glTF: packed clips, stills, moving points; and fewer influences.
 
-use super::report::Done;
-use super::{Args, write};
-use crate::cli::{Failure, load, say, say::Say};
+use super::clips::Edited;
+use super::report::{self, Done};
+use super::{Args, failure, write};
+use crate::cli::{Failure, say::Say};
 use serde_json::{Map, Value, json};
 use sinew::asset::Asset;
-use sinew::bake::{self, BakeDesc, BakeError, Baked, influences};
+use sinew::bake::{self, BakeDesc, Baked, influences};
 use sinew::clip::Clip;
 use sinew::io::picture::{AtomicFile, Folder};
 use sinew::io::still::{self, Stance, Still};
-use sinew::io::{self, Import, Options, gltf, obj, pc2, ply, sinew_clip, stl};
+use sinew::io::{self, Import, gltf, obj, pc2, ply, sinew_clip, stl};
 use sinew::pose::Pose;
 use sinew::time::frame_count;
 use std::path::Path;
@@ -57,26 +58,31 @@ impl Forms {
         }
     }
 
-    /// Write what is no curves in glTF; `false` if that is what is wanted.
+    /// Write what is no curves in glTF, and tell what was written; none if that is not what is wanted.
     pub fn write(
         &self,
         args: &Args,
-        [input, output]: [&Path; 2],
+        paths: [&Path; 2],
         import: &Import,
-        clips: &[&Clip],
+        edited: &[Edited],
         desc: &BakeDesc,
         say: &Say,
-    ) -> Result<bool, Failure> {
-        if let Some(t) = self.pose_at {
-            return self.pose(args, [input, output], import, clips, t).map(|()| true);
+    ) -> Result<Option<Value>, Failure> {
+        let clips: Vec<&Clip> = edited.iter().map(|e| &e.clip).collect();
+        let mut told = if let Some(t) = self.pose_at {
+            self.pose(args, paths, import, &clips, t)?
+        } else if self.vertices {
+            self.points(args, paths, import, &clips, say)?
+        } else if ending(paths[1]) == "sinew" {
+            packed(args, paths[1], import, edited, desc, say)?
+        } else {
+            return Ok(None);
+        };
+        (told["input"], told["output"]) = (json!(paths[0]), json!(paths[1]));
+        if !args.json {
+            say.note(&format!("wrote {}", paths[1].display()));
         }
-        if self.vertices {
-            return self.points(args, [input, output], import, clips, say).map(|()| true);
-        }
-        if ending(output) == "sinew" {
-            return packed(args, [input, output], import, clips, desc, say).map(|()| true);
-        }
-        Ok(false)
+        Ok(Some(told))
     }
 
     fn pose(
@@ -86,21 +92,20 @@ impl Forms {
         import: &Import,
         clips: &[&Clip],
         t: f64,
-    ) -> Result<(), Failure> {
+    ) -> Result<Value, Failure> {
         let c = &import.asset.character;
         let mut pose = c.rest_pose();
         clips.iter().take(1).for_each(|clip| clip.sample(c.skeleton(), t, &mut pose));
         let stance = Stance::new(c, &groups(import));
         let asset = &import.asset;
+        let told = json!({"pose_at": t, "clip": clips.first().map(|c| &c.name)});
         match ending(output).as_str() {
             "obj" => with_materials(args, output, &stance.at(&pose), asset),
             "ply" => put(args, output, &ply::write(&stance.at(&pose))),
             "stl" => put(args, output, &stl::write(&stance.at(&pose))),
-            _ => {
-                let told = json!({"pose_at": t, "clip": clips.first().map(|c| &c.name)});
-                frozen(args, [input, output], import, &[pose], 1.0, "pose", told)
-            }
-        }
+            _ => frozen(args, [input, output], import, &[pose], 1.0, "pose", &told),
+        }?;
+        Ok(told)
     }
 
     fn points(
@@ -110,7 +115,7 @@ impl Forms {
         import: &Import,
         clips: &[&Clip],
         say: &Say,
-    ) -> Result<(), Failure> {
+    ) -> Result<Value, Failure> {
         let [clip] = clips else {
             return Err(Failure::Usage("--vertices: expected one clip; choose it with --clip".into()));
         };
@@ -139,38 +144,44 @@ impl Forms {
             let still = stance.at(&pose(time(0.0)));
             let mut bytes = pc2::head(still.points.len() as u32, intervals as u32 + 1);
             for k in 0..=intervals {
-                let points: Vec<_> = stance.points(&pose(time(k as f64))).iter().map(|p| p.as_vec3()).collect();
+                let points: Vec<_> =
+                    stance.points(&pose(time(k as f64))).iter().map(|p| p.as_vec3()).collect();
                 bytes.extend(pc2::sample(&points));
             }
             with_materials(args, &output.with_extension("obj"), &still, &import.asset)?;
             put(args, output, &bytes)?;
         } else {
             let poses: Vec<Pose> = (0..=intervals).map(|k| pose(time(k as f64))).collect();
-            frozen(args, [input, output], import, &poses, self.vertices_fps, &clip.name, told)?;
+            frozen(args, [input, output], import, &poses, self.vertices_fps, &clip.name, &told)?;
         }
         say.note(&format!(
             "{} frames; exact at each, and up to {:.4} mm off in the middle between two",
             intervals + 1,
             1e3 * off
         ));
-        Ok(())
+        Ok(told)
     }
 
-    /// The character with fewer influences, and what that costs.
-    pub fn limit(&self, import: &mut Import, clips: &[&Clip], say: &Say) -> Result<Option<Value>, Failure> {
-        let Some(k) = self.influences else { return Ok(None) };
+    /// The import with fewer influences, and what that costs.
+    pub fn limited(&self, import: &Import, clips: &[&Clip], say: &Say) -> Option<(Import, Value)> {
+        let k = self.influences?;
         let c = &import.asset.character;
         let less = c.with_influences(k.into());
         let cost = influences::cost(c, &less, clips);
         say.note(&format!(
-            "at most {k} influences: {} vertices lose up to {:.1}% of their weight, and stray by {:.4} mm at most (no more than {:.4} mm by the weights)",
-            cost.vertices, 100.0 * cost.dropped, 1e3 * cost.worst.distance, 1e3 * cost.bound
+            "at most {k} influences: {} vertices lose up to {:.1}% of their weight and stray by up to {:.4} mm (by their weights, no more than {:.4} mm)",
+            cost.vertices,
+            100.0 * cost.dropped,
+            1e3 * cost.worst.distance,
+            1e3 * cost.bound
         ));
-        import.asset.character = less;
-        Ok(Some(json!({
-            "kept": k, "vertices": cost.vertices, "dropped": cost.dropped, "bound": cost.bound, "measured": cost.worst.distance,
-            "time": cost.worst.time, "moments": cost.moments,
-        })))
+        let told = json!({
+            "kept": k, "vertices": cost.vertices, "dropped": cost.dropped, "bound": cost.bound,
+            "measured": cost.worst.distance, "time": cost.worst.time, "moments": cost.moments,
+        });
+        let mut limited = import.clone();
+        limited.asset.character = less;
+        Some((limited, told))
     }
 
     /// Whether the file's own influences no longer serve.
@@ -203,14 +214,15 @@ fn frozen(
     poses: &[Pose],
     fps: f64,
     name: &str,
-    told: Value,
+    told: &Value,
 ) -> Result<(), Failure> {
     let bad = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", input.display()));
     let character = still::frozen(&import.asset.character, poses, fps, name);
     let clips: Vec<gltf::NewClip> =
         character.clips().iter().map(|clip| gltf::NewClip { clip, short: &[], replaces: None }).collect();
-    let asset = Asset { character: character.clone(), materials: import.asset.materials.clone(), ..Asset::default() };
-    let extras = Map::from_iter([("sinew".to_owned(), told)]);
+    let asset =
+        Asset { character: character.clone(), materials: import.asset.materials.clone(), ..Asset::default() };
+    let extras = Map::from_iter([("sinew".to_owned(), told.clone())]);
     let (mut out, _) = gltf::write(&asset, &[], &clips, extras).map_err(|e| bad(&e))?;
     if import.format == "glTF" {
         let bytes = io::read_file(input).map_err(|e| bad(&e))?;
@@ -224,31 +236,22 @@ fn frozen(
 /// Packed clips in a file of their own.
 fn packed(
     args: &Args,
-    [input, output]: [&Path; 2],
+    output: &Path,
     import: &Import,
-    clips: &[&Clip],
+    edited: &[Edited],
     desc: &BakeDesc,
     say: &Say,
-) -> Result<(), Failure> {
+) -> Result<Value, Failure> {
     let c = &import.asset.character;
-    let (mut done, mut told) = (vec![], vec![]);
-    for clip in clips {
-        let one = bake::pack(c, clip, desc).map_err(|e| match e {
-            BakeError::Missed { .. } => Failure::Differs(format!("{}: {e}", input.display())),
-            _ => Failure::Usage(format!("{}: {e}", input.display())),
-        })?;
-        let baked = Baked { report: one.report, ..Baked::default() };
-        told.push(Done { clip, replaces: None, baked });
-        done.push((clip.name.as_str(), one.packed));
+    let (mut packed, mut done) = (vec![], vec![]);
+    for e in edited {
+        let one = bake::pack(c, &e.clip, desc).map_err(failure)?;
+        done.push(Done { edited: e, baked: Baked { report: one.report, ..Baked::default() } });
+        packed.push((e.clip.name.as_str(), one.packed));
     }
-    let all: Vec<_> = done.iter().map(|(name, p)| (*name, p)).collect();
+    let all: Vec<_> = packed.iter().map(|(name, p)| (*name, p)).collect();
     put(args, output, &sinew_clip::write(c, &all))?;
     let diagonal = bake::Gauge::new(c, 1).diagonal();
-    if args.json {
-        let report = super::report::report(import, &told, args.metric, desc.tolerance, diagonal);
-        return crate::cli::print(format!("{report:#}\n").as_bytes());
-    }
-    told.iter().for_each(|d| say.note(&super::report::line(import, d, diagonal)));
-    say.note(&format!("wrote {}", output.display()));
-    Ok(())
+    done.iter().filter(|_| !args.json).for_each(|d| say.note(&report::line(import, d, diagonal)));
+    Ok(report::report(import, &done, args, desc.tolerance, diagonal))
 }

@@ -16,6 +16,7 @@ mod draco;
 mod error;
 mod extensions;
 mod geometry;
+mod influences;
 mod material;
 mod mend;
 mod mounts;
@@ -32,7 +33,7 @@ mod wear;
 mod write;
 
 pub use error::GltfError;
-pub use rewrite::{NewClip, Rewritten, with_clips};
+pub use rewrite::{NewClip, Rewritten, with_clips, with_clips_and_influences};
 pub use wear::wear;
 pub use write::write;
 
