@@ -10,13 +10,15 @@ use sinew::io::{self, Import, gltf};
 use std::path::{Path, PathBuf};
 
 /// Say so before the work and not after it.
-pub(super) fn check_name(name: &str) -> Result<(), Failure> {
-    let known = Path::new(name)
-        .extension()
-        .is_some_and(|e| ["glb", "gltf", "json"].iter().any(|k| e.eq_ignore_ascii_case(k)));
+pub(super) fn check_name(name: &str, endings: &[&str]) -> Result<(), Failure> {
+    let known =
+        Path::new(name).extension().is_some_and(|e| endings.iter().any(|k| e.eq_ignore_ascii_case(k)));
     match known {
         true => Ok(()),
-        false => Err(Failure::Usage(format!("-o {name}: expected a name that ends in .glb, .gltf or .json"))),
+        false => {
+            let all = endings.join(", .");
+            Err(Failure::Usage(format!("-o {name}: expected a name that ends in one of .{all}")))
+        }
     }
 }
 
@@ -62,7 +64,7 @@ pub(super) fn write(
     let extras = Map::from_iter([("sinew".to_owned(), report.clone())]);
     if to::is_rig(output) {
         for (name, bytes) in fresh::rig(output, input, import, done, say)? {
-            put(args, &output.with_file_name(name), &bytes)?;
+            put_bytes(args, &output.with_file_name(name), &bytes)?;
         }
         return Ok(());
     }
@@ -78,16 +80,21 @@ pub(super) fn write(
         let bad = |e| Failure::Input(format!("{}: {e}", input.display()));
         out.embed_pictures(Some(folder)).map_err(bad)?;
     }
+    put(args, output, &out)
+}
+
+/// One file, or two.
+pub(super) fn put(args: &Args, output: &Path, out: &gltf::Rewritten) -> Result<(), Failure> {
     if output.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf")) {
         let bin = output.with_extension("bin");
         let uri = bin.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        put(args, &bin, &out.bin)?;
-        return put(args, output, &out.gltf(&uri));
+        put_bytes(args, &bin, &out.bin)?;
+        return put_bytes(args, output, &out.gltf(&uri));
     }
-    put(args, output, &out.glb())
+    put_bytes(args, output, &out.glb())
 }
 
-fn put(args: &Args, path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+pub(super) fn put_bytes(args: &Args, path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     AtomicFile::write(path, bytes, args.force, Folder::MustExist).map_err(|e| Failure::Run(e.to_string()))
 }
 
@@ -114,7 +121,8 @@ fn rewritten(
         })
         .collect();
     let name = input.display().to_string();
-    gltf::with_clips(&bytes, Some(folder(input)), &name, import, &clips, extras).map_err(|e| bad(&e))
+    let write = if args.forms.limits() { gltf::with_clips_and_influences } else { gltf::with_clips };
+    write(&bytes, Some(folder(input)), &name, import, &clips, extras).map_err(|e| bad(&e))
 }
 
 /// What the clips' edits leave to be said.
