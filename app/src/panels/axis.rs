@@ -156,7 +156,7 @@ pub fn ruler(ui: &mut egui::Ui, axis: &Axis, name: &str, state: &State, bus: &mu
             );
         }
     }
-    markers(ui, &painter, rect, axis, state, bus);
+    markers(ui, &painter, rect, axis, name, state, bus);
     head(&painter, rect, axis, state);
 }
 
@@ -176,7 +176,7 @@ fn markers(ui: &egui::Ui, painter: &egui::Painter, rect: Rect, axis: &Axis, stat
         }
         let hit = Rect::from_center_size(pos2(x, rect.bottom() - 7.0), Vec2::splat(14.0));
         let response = ui.interact(hit, ui.scope_id().with(("marker", i)), Sense::click());
-        let name = format!("marker {}", marker.name);
+        let name = format!("{ruler}: {}", marker.name);
         response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Button, true, &name));
         if response.clicked() {
             bus.send(Command::SetTime(marker.time));
