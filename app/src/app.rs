@@ -212,6 +212,9 @@ impl App {
             Task::Open | Task::Save | Task::SaveAs | Task::Export | Task::Quit => {
                 self.jobs.task(ctx, task, &mut self.state, &mut self.bus);
             }
+            Task::FrameAll | Task::FrameSelection if self.panels.hovered == Some(Pane::Viewport) => {
+                self.viewport.task(task, &self.state);
+            }
             _ => self.panels.task(task, &self.state, &mut self.bus),
         }
     }
