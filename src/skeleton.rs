@@ -238,6 +238,11 @@ impl Skeleton {
         self.bones[bone.index()].limits
     }
 
+    /// What was said of the bone, its parent by its place in this skeleton: the list of all bones makes it again.
+    pub fn desc(&self, bone: BoneId) -> BoneDesc {
+        BoneDesc { parent: self.parent(bone).map(BoneId::index), ..self.bones[bone.index()].clone() }
+    }
+
     /// The bone and all below it, as a range of places.
     pub fn subtree(&self, bone: BoneId) -> std::ops::Range<usize> {
         bone.index()..bone.index() + self.subtree[bone.index()] as usize

@@ -27,8 +27,11 @@ pub(super) struct Samples {
     pub own: Vec<usize>,
 }
 
-/// Between two keys of a cubic, so many samples; more where the keys are far apart in time.
+/// Parts between two keys of a cubic, at whose ends samples are taken.
 const CUBIC_STEPS: usize = 8;
+
+/// And between two of a straight piece: fitted cubics bulge between samples.
+const STRAIGHT_STEPS: usize = 4;
 
 impl Samples {
     /// Of a curve: its keys, and points between them.
@@ -65,12 +68,15 @@ impl Samples {
                 self.times.push(to);
                 self.values.extend(held);
             }
-            Interpolation::Linear => self.push(curve, 0.5 * (from + to)),
+            Interpolation::Linear => self.spread(curve, from, to, STRAIGHT_STEPS),
             Interpolation::CatmullRom(_) | Interpolation::Hermite => {
-                (1..CUBIC_STEPS)
-                    .for_each(|i| self.push(curve, from + (to - from) * i as f64 / CUBIC_STEPS as f64));
+                self.spread(curve, from, to, CUBIC_STEPS);
             }
         }
+    }
+
+    fn spread(&mut self, curve: &Curve, from: f64, to: f64, steps: usize) {
+        (1..steps).for_each(|i| self.push(curve, from + (to - from) * i as f64 / steps as f64));
     }
 
     fn push(&mut self, curve: &Curve, t: f64) {
@@ -157,6 +163,18 @@ pub(super) fn fitted(s: &Samples, tolerance: f64, stored: impl Fn(&[f32]) -> Vec
         }
     }
     exact
+}
+
+/// How far pieces are from the samples at most.
+pub(super) fn worst(s: &Samples, p: &Pieces) -> f64 {
+    let w = s.width;
+    let piece = |(k, ends): (usize, &[usize])| {
+        let (a, b) = (&p.values[k * w..(k + 1) * w], &p.values[(k + 1) * w..(k + 2) * w]);
+        let h = s.times[ends[1]] - s.times[ends[0]];
+        let at = |i: usize| if h > 0.0 { (s.times[i] - s.times[ends[0]]) / h } else { (i - ends[0]) as f64 };
+        (ends[0]..=ends[1]).map(|i| off(s.kind, a, b, at(i) as f32, s.value(i))).fold(0.0, f64::max)
+    };
+    p.keys.windows(2).enumerate().map(piece).fold(0.0, f64::max)
 }
 
 impl Samples {

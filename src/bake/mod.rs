@@ -4,18 +4,28 @@
 //! distance to the farthest vertex that it moves. The shares are then grown together, and one by one, as long as the worst vertex
 //! stays within what was asked for. What is promised was measured on the vertices, at keys, at frames and between them.
 
+mod bound;
+mod cubic;
 pub mod edit;
 mod fit;
 mod gauge;
+mod pack;
 mod plan;
+#[cfg(test)]
+mod tests;
 mod times;
+pub mod xzx;
 
-pub use gauge::{Gauge, Lever, Metric, Spot, Worst};
+pub use gauge::{Gauge, Lever, Looks, Metric, Spot, Stage, Watch, Worst};
+pub use pack::{PackedBake, pack};
 
 use crate::character::Character;
 use crate::clip::Clip;
+use crate::pose::Pose;
 use crate::skeleton::BoneId;
 use plan::Plan;
+use std::borrow::Cow;
+use times::Verdict;
 
 /// How a clip is to be baked.
 ///
@@ -34,14 +44,45 @@ pub struct BakeDesc {
     pub pins: Vec<(BoneId, f64)>,
     /// Rotations may be stored as normalised 16-bit integers, where the bound allows.
     pub quantize: bool,
+    /// Keys stand at whole frames of this rate only, and at the clip's ends (see [`edit::resample`]).
+    pub fps: Option<f64>,
+    /// No key moves or goes, but those of tracks that stand still.
+    pub keep_keys: bool,
+    /// The clip is a loop and stays one: its last keys are its first, bit for bit (see [`edit::close`]).
+    pub cycle: bool,
+    /// The clip is additive (see [`edit::additive`]), and measured as it plays over this pose.
+    pub over: Option<Pose>,
+    /// What there is to be little of.
+    pub goal: Goal,
     /// Worker threads; the result does not depend on them.
     pub threads: usize,
+}
+
+/// What a bake makes little of: it decides between hold, linear, Catmull-Rom and cubic curves, track by track.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Goal {
+    /// Bytes of a glTF file, where a cubic key takes three values. Catmull-Rom curves have no place there.
+    #[default]
+    Bytes,
+    /// Keys, for people to edit.
+    Keys,
 }
 
 impl Default for BakeDesc {
     /// A millimetre, on the skin.
     fn default() -> Self {
-        Self { tolerance: 1e-3, metric: Metric::Vertices, pins: vec![], quantize: true, threads: 1 }
+        Self {
+            tolerance: 1e-3,
+            metric: Metric::Vertices,
+            pins: vec![],
+            quantize: true,
+            fps: None,
+            keep_keys: false,
+            cycle: false,
+            over: None,
+            goal: Goal::Bytes,
+            threads: 1,
+        }
     }
 }
 
@@ -50,8 +91,8 @@ impl Default for BakeDesc {
 pub struct Report {
     /// The worst point that was found.
     pub worst: Worst,
-    /// The worst share with what may hide between the moments looked at. An estimate from second differences around the worst moments, not
-    /// a proof.
+    /// What no point exceeds at any time, as a part of its limit: between the moments looked at, second derivatives of the bones' motion bound
+    /// what can hide. Rounding of single precision aside, the true maximum lies between `worst` and this.
     pub ceiling: f64,
     /// Moments at which all vertices were compared.
     pub moments: usize,
@@ -101,16 +142,123 @@ pub enum BakeError {
         /// Where, seconds.
         time: f64,
     },
+    /// So many frames a second do not keep the bound.
+    #[error(
+        "clip `{clip}`: with keys at {fps} frames a second only, asked for {tolerance:.3e} m, reached {reached:.3e} m at {time:.4} s; {better}"
+    )]
+    Frames {
+        /// Which clip.
+        clip: String,
+        /// The rate.
+        fps: f64,
+        /// Metres asked for.
+        tolerance: f64,
+        /// Metres reached.
+        reached: f64,
+        /// Where, seconds.
+        time: f64,
+        /// Which rate would.
+        better: Rates,
+    },
+    /// A last key beyond what anybody can mean.
+    #[error(
+        "clip `{clip}`: its last key is at {time:.3e} s, where single precision tells times {step:.3e} s apart; cut the clip (`--trim ..T`)"
+    )]
+    Late {
+        /// Which clip.
+        clip: String,
+        /// Seconds.
+        time: f64,
+        /// Seconds from one time to the next.
+        step: f64,
+    },
+    /// A clip that cannot be resampled.
+    #[error(transparent)]
+    Edit(#[from] edit::EditError),
 }
+
+/// Which of the usual rates keeps a bound, if any does.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Rates(pub Option<f64>);
+
+impl std::fmt::Display for Rates {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.0 {
+            Some(fps) => write!(f, "{fps} frames a second would"),
+            None => f.write_str("no usual rate would: something changes at once between frames, or too fast"),
+        }
+    }
+}
+
+/// Rates that are tried where the one asked for does not suffice.
+const USUAL: [f64; 14] =
+    [12.0, 15.0, 24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 90.0, 100.0, 120.0, 240.0, 480.0, 960.0];
+
+/// Ends of a loop that agree to this part of their track, or radians, are made equal.
+const SEAM: f64 = 1e-3;
 
 /// Find few keys that move the character as `clip` does.
 ///
 /// # Errors
-/// [`BakeError`]: a tolerance that is none, or one that is finer than single precision.
+/// [`BakeError`]: a tolerance that is none, one that is finer than single precision or than frames allow, or a clip without an end.
 ///
 /// # Panics
 /// If the clip is not of the character.
 pub fn bake(character: &Character, clip: &Clip, desc: &BakeDesc) -> Result<Baked, BakeError> {
+    bake_watched(character, clip, desc, &|_, _| {})
+}
+
+/// The same, and tell how many poses were compared as it goes.
+///
+/// # Errors
+/// As [`bake`].
+///
+/// # Panics
+/// As [`bake`].
+pub fn bake_watched(
+    character: &Character,
+    clip: &Clip,
+    desc: &BakeDesc,
+    watch: Watch,
+) -> Result<Baked, BakeError> {
+    check(character, clip, desc)?;
+    let mut gauge = Gauge::of(character, desc).watched(watch);
+    let start = start(clip, desc, desc.fps)?;
+    let mut plan = Plan::new(character, clip, &start, &gauge, desc);
+    gauge.enter(Stage::Search);
+    let mut baked = plan.search(&gauge);
+    gauge.enter(Stage::Check);
+    for _ in 0..8 {
+        let Verdict { worst, ceiling, moments } = times::verify(&gauge, clip, &baked.clip);
+        let report = &mut baked.report;
+        (report.worst, report.ceiling, report.moments) = (worst, ceiling, moments);
+        if ceiling <= 1.0 {
+            return Ok(baked);
+        }
+        // What hid between the moments of the search: aim a little lower.
+        let over = if worst.share() > 1.0 { worst.share() } else { ceiling };
+        baked = plan.within((0.95 / over).min(0.9));
+    }
+    let plain = plan.untouched();
+    let Verdict { worst, ceiling, moments } = times::verify(&gauge, clip, &plain.clip);
+    if ceiling <= 1.0 {
+        return Ok(Baked { report: Report { worst, ceiling, moments, ..plain.report }, ..plain });
+    }
+    let name = clip.name.clone();
+    let (tolerance, reached, time) = (worst.limit, ceiling * worst.limit, worst.time);
+    let Some(fps) = desc.fps else {
+        return Err(BakeError::Missed { clip: name, tolerance, reached, time });
+    };
+    let keeps = |fps: &f64| {
+        let frames = self::start(clip, desc, Some(*fps));
+        frames.is_ok_and(|frames| times::verify(&gauge, clip, &frames).ceiling <= 1.0)
+    };
+    let better = Rates(USUAL.into_iter().filter(|r| *r > fps).find(keeps));
+    Err(BakeError::Frames { clip: name, fps, tolerance, reached, time, better })
+}
+
+/// Whether what is asked for means anything.
+fn check(character: &Character, clip: &Clip, desc: &BakeDesc) -> Result<(), BakeError> {
     let mut asked = std::iter::once(desc.tolerance).chain(desc.pins.iter().map(|p| p.1));
     if let Some(found) = asked.find(|t| t.is_nan() || *t <= 0.0) {
         return Err(BakeError::Tolerance { found });
@@ -119,27 +267,16 @@ pub fn bake(character: &Character, clip: &Clip, desc: &BakeDesc) -> Result<Baked
     if vertices == 0 && desc.metric == Metric::Vertices {
         return Err(BakeError::NoSkin);
     }
-    let gauge = Gauge::of(character, desc);
-    let mut plan = Plan::new(character, clip, &gauge, desc);
-    let mut baked = plan.search(&gauge);
-    let mut share = 1.0;
-    for _ in 0..8 {
-        let (worst, ceiling, moments) = times::verify(&gauge, clip, &baked.clip);
-        let report = &mut baked.report;
-        (report.worst, report.ceiling, report.moments) = (worst, ceiling, moments);
-        if ceiling <= 1.0 {
-            return Ok(baked);
-        }
-        // What hid between the moments of the search: aim a little lower.
-        share *= (0.95 / ceiling).min(0.9);
-        baked = plan.within(share);
-    }
-    let plain = plan.untouched();
-    let (worst, ceiling, moments) = times::verify(&gauge, clip, &plain.clip);
-    if ceiling <= 1.0 {
-        return Ok(Baked { report: Report { worst, ceiling, moments, ..plain.report }, ..plain });
-    }
-    let clip = clip.name.clone();
-    let (tolerance, reached) = (worst.limit, ceiling * worst.limit);
-    Err(BakeError::Missed { clip, tolerance, reached, time: worst.time })
+    // Times that no file holds to the second are a mistake, and looking between them has no end.
+    let range = clip.range();
+    let time = if range.end.abs() > range.start.abs() { range.end } else { range.start };
+    let step = edit::spacing(time.abs());
+    if step >= 1.0 { Err(BakeError::Late { clip: clip.name.clone(), time, step }) } else { Ok(()) }
+}
+
+/// The keys to choose from.
+fn start<'c>(clip: &'c Clip, desc: &BakeDesc, fps: Option<f64>) -> Result<Cow<'c, Clip>, BakeError> {
+    let frames = fps.map(|fps| edit::resample(clip, fps)).transpose()?;
+    let frames = frames.map_or(Cow::Borrowed(clip), Cow::Owned);
+    Ok(if desc.cycle { Cow::Owned(edit::close(&frames, SEAM)) } else { frames })
 }

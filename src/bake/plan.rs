@@ -1,17 +1,17 @@
 //! How the error is shared among the tracks.
 
 use super::fit::{self, Kind, Samples};
-use super::gauge::Gauge;
-use super::{BakeDesc, Baked, Report, times};
+use super::gauge::{Gauge, Looks};
+use super::{BakeDesc, Baked, Goal, Report, SEAM, cubic, edit, times};
 use crate::character::Character;
 use crate::clip::{Clip, Curve, Interpolation, Target, Track};
 use std::collections::BTreeSet;
 
 /// Moments at which levers are measured.
-const LEVER_MOMENTS: usize = 24;
+pub(super) const LEVER_MOMENTS: usize = 24;
 
 /// Moments at which the search compares vertices.
-const SEARCH_MOMENTS: usize = 400;
+pub(super) const SEARCH_MOMENTS: usize = 400;
 
 /// Vertices times moments that the search may compare in all.
 const SEARCH_WORK: usize = 400_000_000;
@@ -45,14 +45,15 @@ pub(super) struct Plan<'a> {
 }
 
 impl<'a> Plan<'a> {
-    pub fn new(character: &Character, clip: &'a Clip, gauge: &Gauge, desc: &BakeDesc) -> Self {
+    /// `start` holds the keys to choose from; what they make is compared with `clip`.
+    pub fn new(character: &Character, clip: &'a Clip, start: &Clip, gauge: &Gauge, desc: &BakeDesc) -> Self {
         let levers = gauge.levers(clip, &times::coarse(clip, LEVER_MOMENTS));
         let longest = levers.iter().map(|l| l.turn).fold(0.0, f64::max);
-        let rest = character.rest_pose();
+        let rest = gauge.unmoved();
         let targets = character.target_reach();
         let vertices = character.instances().iter().map(|i| character.mesh(i).positions.len()).sum();
         let mut jobs: Vec<Job> = vec![];
-        for track in &clip.tracks {
+        for track in &start.tracks {
             let at = |b: crate::skeleton::BoneId| levers[b.index()].turn.max(0.02 * longest).max(1e-9);
             let (kind, lever, rest) = match track.target {
                 Target::Rotation(b) => {
@@ -90,11 +91,12 @@ impl<'a> Plan<'a> {
     /// The largest shares that keep the bound at the search's moments: all together first, then one after the other.
     pub fn search(&mut self, gauge: &Gauge) -> Baked {
         let aim = 0.97;
+        let looks = gauge.looks(self.clip, &self.moments);
         let mut best = 0.0;
         let (mut low, mut high) = (1e-4, f64::INFINITY);
         for _ in 0..14 {
             self.make_all();
-            let error = gauge.worst(self.clip, &self.assemble(), &self.moments).share();
+            let error = gauge.worst_of(&looks, &self.assemble()).share();
             if error <= aim {
                 (best, low) = (self.share, self.share);
             } else {
@@ -115,12 +117,12 @@ impl<'a> Plan<'a> {
         }
         self.share = best;
         self.make_all();
-        self.widen(gauge, aim);
+        self.widen(gauge, &looks, aim);
         self.finish()
     }
 
     /// Give single tracks more where the worst vertex does not notice.
-    fn widen(&mut self, gauge: &Gauge, aim: f64) {
+    fn widen(&mut self, gauge: &Gauge, looks: &Looks, aim: f64) {
         let mut work = SEARCH_WORK / (self.vertices * self.moments.len()).max(1);
         for factor in [2.5, 1.6, 1.25] {
             // Those with most keys have most to give.
@@ -136,7 +138,7 @@ impl<'a> Plan<'a> {
                 self.make(i);
                 if self.jobs[i].keys() < before {
                     work -= 1;
-                    if gauge.worst(self.clip, &self.assemble(), &self.moments).share() <= aim {
+                    if !gauge.strays(looks, &self.assemble(), aim) {
                         continue;
                     }
                 }
@@ -167,7 +169,7 @@ impl<'a> Plan<'a> {
     fn make(&mut self, i: usize) {
         let job = &mut self.jobs[i];
         let allowed = self.share * job.weight * self.desc.tolerance / job.lever;
-        job.made = job.reduced(allowed, self.desc.quantize);
+        job.made = job.reduced(allowed, &self.desc);
     }
 
     fn assemble(&self) -> Clip {
@@ -177,7 +179,7 @@ impl<'a> Plan<'a> {
         });
         let mut clip = Clip { name: self.clip.name.clone(), tracks: tracks.collect() };
         self.hold_ends(&mut clip);
-        clip
+        if self.desc.cycle { edit::close(&clip, SEAM) } else { clip }
     }
 
     /// A clip lasts as long as it did: the shortest track says so where what moved at the ends is gone.
@@ -234,14 +236,27 @@ pub(super) fn bytes(clip: &Clip, short: &[bool]) -> usize {
     sum
 }
 
+impl Goal {
+    /// What a curve costs beside others of its track.
+    fn cost(self, curve: &Curve, short: bool, source: &Curve) -> usize {
+        match self {
+            Self::Keys => curve.times().len(),
+            Self::Bytes => {
+                let times = if curve.times() == source.times() { 0 } else { 4 * curve.times().len() };
+                times + curve.values().len() * if short { 2 } else { 4 }
+            }
+        }
+    }
+}
+
 impl Job {
     fn keys(&self) -> usize {
         self.made.as_ref().map_or(0, |m| m.0.times().len())
     }
 
     /// The fewest keys within `allowed`, and whether they are 16-bit integers.
-    fn reduced(&self, allowed: f64, quantize: bool) -> Option<(Curve, bool)> {
-        let s = &self.samples;
+    fn reduced(&self, allowed: f64, desc: &BakeDesc) -> Option<(Curve, bool)> {
+        let (s, quantize, goal) = (&self.samples, desc.quantize, desc.goal);
         if s.is_constant(&self.rest, allowed) {
             return None;
         }
@@ -252,27 +267,51 @@ impl Job {
             let curve = Curve::new(vec![s.times[0]], first, s.width, Interpolation::Hold);
             return curve.ok().map(|c| (c, short));
         }
+        if desc.keep_keys {
+            // Slopes need more than 16 bits hold.
+            let source = self.source.with_slopes();
+            let short = short && source.interpolation() != Interpolation::Hermite;
+            let values = if short {
+                source.values().iter().map(|x| shortened(*x)).collect()
+            } else {
+                source.values().to_vec()
+            };
+            let curve = Curve::new(source.times().to_vec(), values, s.width, source.interpolation());
+            return curve.ok().map(|c| (c, short));
+        }
         if self.source.interpolation() == Interpolation::Hold {
             return Some((self.steps(allowed, stored), short));
         }
-        let mut pieces = fit::fitted(s, allowed, stored);
+        let own = [Interpolation::Linear, Interpolation::Hermite].contains(&self.source.interpolation());
+        let pieces = fit::fitted(s, allowed, stored);
+        let mut best = (self.straight(&pieces), short);
+        let mut others = vec![];
         // Keys that stay where all of them were share their times with other tracks.
-        let value = s.width * if short { 2 } else { 4 };
-        if self.source.interpolation() == Interpolation::Linear
-            && pieces.keys.len() * (value + 4) > s.own.len() * value
-        {
-            pieces = fit::all(s, stored);
+        if goal == Goal::Bytes && self.source.interpolation() == Interpolation::Linear {
+            others.push((self.straight(&fit::all(s, stored)), short));
+        } else if own || goal == Goal::Keys {
+            others.push((self.source.clone(), false));
         }
-        // A cubic that straight pieces would only make longer stays as it is.
-        if self.source.interpolation() == Interpolation::Hermite {
-            let own = self.source.times().len() * (12 * s.width + 4);
-            if pieces.keys.len() * (value + 4) >= own {
-                return Some((self.source.clone(), false));
+        // No cubic is smaller than three straight pieces.
+        if pieces.keys.len() > 4 {
+            if goal == Goal::Keys {
+                others.push((cubic::by_rule(s, allowed), false));
+            }
+            others.push((cubic::own_slopes(s, allowed), false));
+        }
+        for (curve, short) in others {
+            if goal.cost(&curve, short, &self.source) < goal.cost(&best.0, best.1, &self.source) {
+                best = (curve, short);
             }
         }
+        Some(best)
+    }
+
+    fn straight(&self, pieces: &fit::Pieces) -> Curve {
+        let s = &self.samples;
         let times = pieces.keys.iter().map(|&k| s.times[k]).collect();
-        let curve = Curve::new(times, pieces.values, s.width, Interpolation::Linear);
-        Some((curve.expect("keys of a curve, in order"), short))
+        let curve = Curve::new(times, pieces.values.clone(), s.width, Interpolation::Linear);
+        curve.expect("keys of a curve, in order")
     }
 
     /// Steps whose value changes.

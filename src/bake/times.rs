@@ -1,19 +1,20 @@
 //! When to look: at keys, at frames, and between them.
 
+use super::bound::Bound;
 use super::gauge::{Gauge, Worst};
 use crate::clip::Clip;
 
-/// Looks a second of a verified clip, at least.
-const RATE: f64 = 240.0;
+/// Gaps between keys that are worked on together, so that memory does not grow with a clip's length.
+const GAPS: usize = 2048;
 
-/// Looks between two keys of either clip, at least.
-const BETWEEN: usize = 4;
+/// How close the bound is brought to what was measured, as a part of it.
+const BRACKET: f64 = 1.02;
 
-/// Gaps around the worst moments that are looked at more closely.
-const CLOSER: usize = 8;
+/// Rounds of halving that only bring the bound closer, and gaps in each.
+const CLOSER: [usize; 2] = [12, 64];
 
-/// The most looks at a clip: beyond that, gaps between frames grow.
-const MOST: usize = 200_000;
+/// Halvings of a gap before it is given up: 2⁻³⁰ of it.
+const DEEPEST: u32 = 30;
 
 /// All key times of clips, once each, ascending.
 pub(super) fn knots(clips: &[&Clip]) -> Vec<f64> {
@@ -33,48 +34,108 @@ pub(super) fn coarse(clip: &Clip, most: usize) -> Vec<f64> {
     all.into_iter().step_by(step).collect()
 }
 
-/// Compare two clips: the worst that was found, an estimate of what was not as a share of what is allowed, and the number of moments.
-///
-/// Between two knots the distance of a vertex is smooth. A maximum of a smooth curve that was sampled at distance `h` hides at most
-/// `h²/8` times its second derivative, which the samples' second differences estimate; twice that is added.
-pub(super) fn verify(gauge: &Gauge, a: &Clip, b: &Clip) -> (Worst, f64, usize) {
-    let times = dense(&knots(&[a, b]));
-    let found = gauge.profile(a, b, &times);
-    let mut moments = times.len();
-    let worst = |list: &[Worst]| list.iter().copied().fold(Worst::default(), Worst::worse);
-    let mut top = worst(&found);
-
-    // Look eight times as closely around the worst moments.
-    let mut order: Vec<usize> = (0..found.len()).collect();
-    order.sort_by(|&i, &j| found[j].share().total_cmp(&found[i].share()).then(i.cmp(&j)));
-    order.truncate(CLOSER);
-    let around = |i: usize| [times[i.saturating_sub(1)], times[(i + 1).min(times.len() - 1)]];
-    let closer: Vec<f64> = order
-        .iter()
-        .flat_map(|&i| {
-            let [from, to] = around(i);
-            (1..16).map(move |k| from + (to - from) * k as f64 / 16.0)
-        })
-        .collect();
-    let more = gauge.profile(a, b, &closer);
-    moments += more.len();
-    let best = worst(&more);
-    top = top.worse(best);
-    let bend = |w: &[Worst]| (w[0].share() - 2.0 * w[1].share() + w[2].share()).abs();
-    let near = |w: &&[Worst]| w[1].share() > 0.8 * top.share();
-    let hidden = more.chunks(15).flat_map(|c| c.windows(3)).filter(near).map(bend).fold(0.0, f64::max);
-    (top, top.share() + 2.0 * hidden / 8.0, moments)
+/// What two clips do, between two bounds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Verdict {
+    /// The worst that was measured.
+    pub worst: Worst,
+    /// What nothing exceeds at any time, as a part of what is allowed.
+    pub ceiling: f64,
+    /// Moments at which vertices were compared.
+    pub moments: usize,
 }
 
-/// Knots, and moments between them.
-fn dense(knots: &[f64]) -> Vec<f64> {
-    let Some((first, last)) = knots.first().zip(knots.last()) else { return vec![0.0] };
-    let step = (1.0 / RATE).max((last - first) / MOST as f64);
-    let mut out = Vec::new();
-    for w in knots.windows(2) {
-        let n = (((w[1] - w[0]) / step).ceil() as usize).max(BETWEEN);
-        out.extend((0..n).map(|k| w[0] + (w[1] - w[0]) * k as f64 / n as f64));
+/// Two moments and what is known between them.
+#[derive(Clone, Copy)]
+struct Gap {
+    times: [f64; 2],
+    shares: [f64; 2],
+    ceiling: f64,
+    depth: u32,
+}
+
+/// Compare two clips at all keys, and between them wherever more than is allowed could hide: gaps are halved until [`Bound`] says that nothing
+/// does, or until a moment is found at which the limit is exceeded.
+pub(super) fn verify(gauge: &Gauge, a: &Clip, b: &Clip) -> Verdict {
+    let knots = knots(&[a, b]);
+    let bound = Bound::new(gauge, [a, b]);
+    let mut verdict = Verdict::default();
+    if knots.len() < 2 {
+        verdict.look(gauge, [a, b], &[knots.first().copied().unwrap_or(0.0)]);
+        verdict.ceiling = verdict.worst.share();
     }
-    out.push(*last);
-    out
+    for part in 0..knots.len().saturating_sub(1).div_ceil(GAPS) {
+        let knots = &knots[part * GAPS..((part + 1) * GAPS + 1).min(knots.len())];
+        let ceiling = verdict.cover(gauge, &bound, [a, b], knots);
+        verdict.ceiling = verdict.ceiling.max(ceiling);
+        if verdict.worst.share() > 1.0 {
+            break;
+        }
+    }
+    verdict
+}
+
+impl Verdict {
+    /// The shares at these moments.
+    fn look(&mut self, gauge: &Gauge, clips: [&Clip; 2], times: &[f64]) -> Vec<f64> {
+        let found = gauge.profile(clips[0], clips[1], times);
+        self.moments += times.len();
+        self.worst = found.iter().copied().fold(self.worst, Worst::worse);
+        found.iter().map(Worst::share).collect()
+    }
+
+    /// A bound for all of the time between the first and the last knot.
+    fn cover(&mut self, gauge: &Gauge, bound: &Bound, clips: [&Clip; 2], knots: &[f64]) -> f64 {
+        let ends: Vec<f64> = knots
+            .windows(2)
+            .flat_map(|w| [w[0], bound.end_before(w[1])])
+            .chain(knots.last().copied())
+            .collect();
+        let mut moments = ends.clone();
+        moments.dedup();
+        let shares = self.look(gauge, clips, &moments);
+        let share = |t: f64| shares[moments.partition_point(|m| *m < t)];
+        let gaps = ends.chunks_exact(2).map(|e| [e[0], e[1]]).filter(|e| e[0] < e[1]);
+        let open: Vec<Gap> =
+            gaps.map(|times| Gap { times, shares: times.map(share), ceiling: f64::NAN, depth: 0 }).collect();
+        let last = share(ends[ends.len() - 1]);
+        // Gaps whose ceiling is known; the fresh ones' is not.
+        let (mut known, mut fresh) = (vec![], open);
+        let mut rounds = 0;
+        loop {
+            let spans: Vec<_> = fresh.iter().map(|g| g.times).collect();
+            let bends = gauge.map(&spans, |times| bound.bend(clips, times));
+            for (gap, bend) in fresh.iter_mut().zip(bends) {
+                let h = gap.times[1] - gap.times[0];
+                gap.ceiling = gap.shares[0].max(gap.shares[1]) + h * h / 8.0 * bend;
+            }
+            known.append(&mut fresh);
+            known.sort_by(|a, b| b.ceiling.total_cmp(&a.ceiling).then(a.times[0].total_cmp(&b.times[0])));
+            let ceiling = known.first().map_or(last, |g| g.ceiling.max(last));
+            let worst = self.worst.share();
+            let above = |limit: f64| known.partition_point(|g| g.ceiling > limit);
+            let mut wide = above(1.0);
+            if wide == 0 {
+                // All is within what is allowed: say more closely by how much.
+                rounds += 1;
+                wide = above(BRACKET * worst).min(CLOSER[1]);
+            }
+            let spent = rounds > CLOSER[0] || known.iter().take(wide).any(|g| g.depth >= DEEPEST);
+            if worst > 1.0 || wide == 0 || spent {
+                return ceiling;
+            }
+            fresh = self.halve(gauge, clips, &known[..wide]);
+            known.drain(..wide);
+        }
+    }
+
+    fn halve(&mut self, gauge: &Gauge, clips: [&Clip; 2], gaps: &[Gap]) -> Vec<Gap> {
+        let middles: Vec<f64> = gaps.iter().map(|g| 0.5 * (g.times[0] + g.times[1])).collect();
+        let shares = self.look(gauge, clips, &middles);
+        let halves = |((gap, &t), &share): ((&Gap, &f64), &f64)| {
+            let half = |times, shares| Gap { times, shares, ceiling: f64::NAN, depth: gap.depth + 1 };
+            [half([gap.times[0], t], [gap.shares[0], share]), half([t, gap.times[1]], [share, gap.shares[1]])]
+        };
+        gaps.iter().zip(&middles).zip(&shares).flat_map(halves).collect()
+    }
 }

@@ -200,6 +200,27 @@ impl Curve {
         }
     }
 
+    /// The second derivative of component `c` by time at `t`, within the piece that begins at or before it: zero for straight pieces and
+    /// outside the keys.
+    pub(crate) fn bend_at(&self, t: f64, c: usize) -> f64 {
+        if matches!(self.interpolation, Interpolation::Hold | Interpolation::Linear) {
+            return 0.0;
+        }
+        let k = self.times.partition_point(|&k| k <= t);
+        if k == 0 || k == self.times.len() {
+            return 0.0;
+        }
+        let [a, b] = [k - 1, k];
+        let (h, w) = (self.times[b] - self.times[a], self.width);
+        let [m0, m1] = match self.interpolation {
+            Interpolation::CatmullRom(rule) => [self.slope(rule, a, c), self.slope(rule, b, c)],
+            _ => [self.values[3 * w * a + 2 * w + c] as f64, self.values[3 * w * b + c] as f64],
+        };
+        let rise = self.value(b)[c] as f64 - self.value(a)[c] as f64;
+        let u = (t - self.times[a]) / h;
+        ((6.0 - 12.0 * u) * rise / h + (6.0 * u - 4.0) * m0 + (6.0 * u - 2.0) * m1) / h
+    }
+
     fn locate(&self, t: f64) -> Place {
         // The last key at or before t: of keys at one time the last wins.
         let after = self.times.partition_point(|&k| k <= t);

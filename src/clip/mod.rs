@@ -3,9 +3,11 @@
 mod curve;
 mod edit;
 mod mirror;
+pub(crate) mod packed;
 
 pub use curve::{Curve, CurveError, Interpolation};
 pub use edit::Retime;
+pub use packed::{Packed, PackedError};
 
 use crate::pose::Pose;
 use crate::skeleton::{BoneId, Skeleton};

@@ -4,7 +4,7 @@
 //! A triple is a `Vec3` holding `(θ₁, θ₂, θ₃)` in radians. The map is singular where θ₂ = 0 or π (at θ₂ = 0, the rest
 //! pose, only θ₁ + θ₃ matters), so rotations are compared, never triples.
 
-use glam::{DQuat, Quat, Vec3};
+use glam::{DQuat, DVec2, Quat, Vec3};
 use std::f64::consts::TAU;
 
 /// The rotation of an XZX triple, computed in f64 after reducing the angles, so that 10⁹ turns cost no accuracy.
@@ -81,6 +81,55 @@ pub fn unwrap_xzx(theta: [f64; 3], previous: [f64; 3]) -> [f64; 3] {
     [(sigma - delta) * 0.5, near(bend, p2), (sigma + delta) * 0.5]
 }
 
+/// The four triples of a unit quaternion that lie nearest to `previous`, the nearest over all three angles first: whole turns and
+/// the other solution `(θ₁+π, −θ₂, θ₃−π)` are tried together.
+///
+/// Where the bend is at most `slack` radians, all four are one: `previous` says how the twist is split, the bend is what lies in
+/// its plane, and the rotation is off by at most `slack`. So noise about a rest pose does not swing the twists. Likewise near π.
+///
+/// ```
+/// use sinew::math::euler::{nearest_xzx, rotation_from_xzx_f64};
+/// // A bend that went through rest and on: the angle changes its sign, not its plane.
+/// let q = rotation_from_xzx_f64([0.3, -0.2, 0.1]);
+/// let t = nearest_xzx(q, [0.3, 0.2, 0.1], 1e-6)[0];
+/// assert!((t[1] + 0.2).abs() < 1e-12 && (t[0] - 0.3).abs() < 1e-12);
+/// ```
+pub fn nearest_xzx(q: DQuat, previous: [f64; 3], slack: f64) -> [[f64; 3]; 4] {
+    let [p1, p2, p3] = previous;
+    // As in `xzx_from_rotation_f64`: two plane vectors, whose directions are σ/2 and δ/2.
+    let (twist, bend) = (DVec2::new(q.w, q.x), DVec2::new(q.z, -q.y));
+    let (c, s) = (twist.length(), bend.length());
+    let (sigma, delta) = (2.0 * q.x.atan2(q.w), 2.0 * (-q.y).atan2(q.z));
+    let triple =
+        |sigma: f64, t2: f64, delta: f64| [(sigma - delta) * 0.5, near(t2, p2), (sigma + delta) * 0.5];
+    let odd = |turned: f64, angle: f64| (((turned - angle) / TAU).round() as i64).rem_euclid(2) == 1;
+    if 2.0 * s.atan2(c) <= slack {
+        let near_sigma = near(sigma, p1 + p3);
+        let along = bend.dot(DVec2::from_angle(0.5 * (p3 - p1)));
+        let along = if odd(near_sigma, sigma) { -along } else { along };
+        return [triple(near_sigma, 2.0 * along.atan2(c), p3 - p1); 4];
+    }
+    if 2.0 * c.atan2(s) <= slack {
+        let near_delta = near(delta, p3 - p1);
+        let along = twist.dot(DVec2::from_angle(0.5 * (p1 + p3)));
+        let along = if odd(near_delta, delta) { -along } else { along };
+        return [triple(p1 + p3, 2.0 * s.atan2(along), near_delta); 4];
+    }
+    let either = |angle: f64, reference: f64| {
+        let first = near(angle, reference);
+        [first, if first > reference { first - TAU } else { first + TAU }]
+    };
+    let (sigmas, deltas) = (either(sigma, p1 + p3), either(delta, p3 - p1));
+    let mut all = [[0, 0], [0, 1], [1, 0], [1, 1]].map(|[i, j]| {
+        let flipped = odd(sigmas[i], sigma) != odd(deltas[j], delta);
+        let t2 = 2.0 * s.atan2(c);
+        triple(sigmas[i], if flipped { -t2 } else { t2 }, deltas[j])
+    });
+    let far = |t: &[f64; 3]| (0..3).map(|k| (t[k] - previous[k]).powi(2)).sum::<f64>();
+    all.sort_by(|a, b| far(a).total_cmp(&far(b)));
+    all
+}
+
 /// `angle` plus the whole turns that bring it within half a turn of `reference`.
 fn near(angle: f64, reference: f64) -> f64 {
     angle - TAU * ((angle - reference) / TAU).round()
@@ -144,6 +193,40 @@ mod tests {
             let mid = rotation_from_xzx_f64([0, 1, 2].map(|k| 0.5 * (t[k] + prev[k])));
             assert!(angle64(mid, prev_q.slerp(q, 0.5)) < 0.5, "flip between {prev:?} and {t:?}");
             (prev, prev_q) = (t, q);
+        }
+    }
+
+    #[test]
+    fn the_nearest_triples_are_of_the_rotation_and_none_is_nearer() {
+        let mut rng = crate::test_rng::Rng::new(4);
+        for _ in 0..5000 {
+            let (q, prev) = ([0; 3].map(|_| rng.range(-4.0, 4.0)), [0; 3].map(|_| rng.range(-9.0, 9.0)));
+            let q = rotation_from_xzx_f64(q);
+            let far = |t: [f64; 3]| (0..3).map(|k| (t[k] - prev[k]).powi(2)).sum::<f64>();
+            let all = nearest_xzx(q, prev, 1e-9);
+            assert!(all.iter().all(|t| angle64(rotation_from_xzx_f64(*t), q) < 1e-12));
+            // Every solution within three turns.
+            let t = xzx_from_rotation_f64(q, None);
+            for i in 0..7 * 7 * 7 * 2 {
+                let turn = |k: usize| ((i / 2 / 7usize.pow(k as u32)) % 7) as f64 * TAU - 3.0 * TAU;
+                let other = if i % 2 == 0 { t } else { [t[0] + PI, -t[1], t[2] - PI] };
+                let other = [0, 1, 2].map(|k| other[k] + turn(k));
+                assert!(far(other) > far(all[0]) - 1e-9, "{other:?} is nearer to {prev:?} than {:?}", all[0]);
+            }
+        }
+    }
+
+    #[test]
+    fn where_twists_trade_freely_they_are_split_as_before() {
+        let mut rng = crate::test_rng::Rng::new(5);
+        for _ in 0..5000 {
+            let prev = [0; 3].map(|_| rng.range(-9.0, 9.0));
+            let bend = if rng.range(0.0, 1.0) < 0.5 { 0.0 } else { PI } + rng.range(-0.01, 0.01);
+            let q = rotation_from_xzx_f64([rng.range(-9.0, 9.0), bend, rng.range(-9.0, 9.0)]);
+            let t = nearest_xzx(q, prev, 0.011)[0];
+            assert!(angle64(rotation_from_xzx_f64(t), q) < 0.011);
+            let [d, s] = [t[2] - t[0] - prev[2] + prev[0], t[2] + t[0] - prev[2] - prev[0]];
+            assert!(d.abs().min(s.abs()) < 1e-9, "{t:?} after {prev:?}");
         }
     }
 

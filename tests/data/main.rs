@@ -16,6 +16,7 @@ mod rng;
 mod scenes;
 mod sha256;
 mod support;
+mod xzx;
 
 use libtest_mimic::{Arguments, Trial};
 
@@ -41,6 +42,7 @@ const TESTS: &[(&str, Test)] = &[
     ("gltf_agrees_with_the_oracle", gltf_oracle::run),
     ("captures_agree_with_the_oracle", bvh::run),
     ("baked_clips_keep_their_bounds_and_are_small", bake::run),
+    ("angles_and_back_on_every_animated_file", xzx::run),
     ("notes::the_robot_arm_is_where_it_should_be", notes::the_robot_arm_is_where_it_should_be),
     ("notes::closest_segments_rebuild_the_arms_weights", notes::closest_segments_rebuild_the_arms_weights),
     ("notes::rest_is_the_identity", notes::rest_is_the_identity),
