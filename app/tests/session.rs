@@ -33,7 +33,16 @@ impl Person {
     }
 
     pub fn node<'n>(&'n self, name: &'n str) -> Node<'n> {
-        self.ui.get_by_label(name)
+        let mut found = self.ui.query_all_by_label(name);
+        let first = found.next().unwrap_or_else(|| panic!("nothing is called `{name}`"));
+        assert!(found.next().is_none(), "two things are called `{name}`");
+        first
+    }
+
+    /// Choose a bone in the tree, wherever it is scrolled to.
+    pub fn pick(&mut self, bone: &str) {
+        self.type_into("Filter of the bones", bone);
+        self.click(bone);
     }
 
     pub fn has(&self, name: &str) -> bool {
@@ -123,9 +132,9 @@ fn from_the_first_bone_to_the_last_frame() {
     for (frame, bend) in [("0", "10"), ("12", "70"), ("24", "10")] {
         p.type_into("Frame", frame);
         for bone in ["shin.L", "thigh.L"] {
-            p.click(bone);
+            p.pick(bone);
             p.type_into(&format!("{bone} θ2"), bend);
-            p.hover(p.place("Dope sheet").center());
+            p.hover(p.place("Dope sheet keys").center());
             p.key(Modifiers::NONE, Key::I);
         }
     }
@@ -152,7 +161,7 @@ fn from_the_first_bone_to_the_last_frame() {
 
     // All keys by a box on empty ground, stretched to twice the time about frame 0.
     p.type_into("Frame", "0");
-    let dope = p.place("Dope sheet");
+    let dope = p.place("Dope sheet keys");
     p.drag(
         pos2(dope.right() - 12.0, dope.bottom() - 12.0),
         pos2(dope.left() + 152.0, dope.top() + 50.0),
@@ -248,7 +257,7 @@ fn the_ruler_scrubs_the_wheel_zooms_and_the_playhead_stays_in_view() {
 #[test]
 fn every_action_can_be_found_and_nothing_panics() {
     let mut p = Person::at(State::open(pip()));
-    p.click("shin.L");
+    p.pick("shin.L");
     for action in sinew_app::commands::ACTIONS.iter().filter(|a| a.menu != "File") {
         p.key(CTRL, Key::P);
         assert!(p.has("Search for a command"), "{}", action.name);

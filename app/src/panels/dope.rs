@@ -107,7 +107,7 @@ impl Dope {
         let body = Rect::from_min_max(keys.min + Vec2::new(0.0, ROW), keys.max);
 
         let sense = ui.interact(pane, ui.scope_id().with("dope"), Sense::click_and_drag());
-        sense.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Grid, true, "Dope sheet"));
+        sense.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Grid, true, "Dope sheet keys"));
         self.scroll -= axis::navigate(ui, pane, &axis, state, bus);
         self.keep_scroll(body);
         axis::follow(&axis, &mut self.last_time, state, bus);
@@ -408,7 +408,8 @@ pub(super) fn menu(ui: &mut egui::Ui, of: &[&str], state: &State, bus: &mut Bus)
         if let Some(keys) = action.shortcut {
             button = button.shortcut_text(ui.ctx().format_shortcut(&keys));
         }
-        if ui.add_enabled((action.enabled)(state), button).on_hover_text(action.help).clicked() {
+        let response = ui.add_enabled((action.enabled)(state), button).on_hover_text(action.help);
+        if response.accessible_name(action.name).clicked() {
             bus.run(action, state);
             ui.close();
         }

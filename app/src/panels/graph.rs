@@ -98,7 +98,7 @@ impl Graph {
         let values = Values { rect, low, high };
 
         let sense = ui.interact(pane, ui.scope_id().with("graph"), Sense::click_and_drag());
-        sense.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Canvas, true, "Graph"));
+        sense.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Canvas, true, "Graph curves"));
         let up = axis::navigate(ui, pane, &axis, state, bus);
         self.scroll(ui, pane, up, &values);
         axis::follow(&axis, &mut self.last_time, state, bus);

@@ -113,11 +113,12 @@ fn menu_items(ui: &mut egui::Ui, menu: &str, state: &State, bus: &mut Bus) {
             "Redo" => state.redo_name().map_or("Redo".into(), |n| format!("Redo {}", n.to_lowercase())),
             name => name.to_string(),
         };
-        let mut button = egui::Button::new(text);
+        let mut button = egui::Button::new(&text);
         if let Some(s) = action.shortcut {
             button = button.shortcut_text(ui.ctx().format_shortcut(&s));
         }
-        if ui.add_enabled((action.enabled)(state), button).on_hover_text(action.help).clicked() {
+        let response = ui.add_enabled((action.enabled)(state), button).on_hover_text(action.help);
+        if response.accessible_name(text).clicked() {
             bus.run(action, state);
             ui.close();
         }

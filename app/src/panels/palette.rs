@@ -70,7 +70,7 @@ fn row(ui: &mut egui::Ui, action: &Action, at: bool, state: &State) -> bool {
     if at {
         response.scroll_to_me(None);
     }
-    response.on_hover_text(action.help).clicked()
+    response.on_hover_text(action.help).accessible_name(action.name).clicked()
 }
 
 /// Every word typed occurs in the name, the menu or the help.
