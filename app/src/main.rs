@@ -49,7 +49,8 @@ fn parse(mut given: impl Iterator<Item = std::ffi::OsString>) -> Result<Args, St
                 let text = value()?.to_string_lossy().into_owned();
                 let sides = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
                 let fine = |s: &[u16; 2]| s.iter().all(|s| (64..=8192).contains(s));
-                let sides = sides.filter(fine).ok_or(format!("--size {text}: expected 64x64 to 8192x8192"))?;
+                let sides =
+                    sides.filter(fine).ok_or(format!("--size {text}: expected 64x64 to 8192x8192"))?;
                 args.size = sides.map(f32::from);
             }
             _ if name.starts_with("--") => return Err(format!("{name} is not known")),
@@ -70,7 +71,7 @@ fn picture(args: &Args, out: &Path) -> ExitCode {
         let _ = app.state.update(Command::SetTime(t));
     }
     let picture = screenshot::draw(&mut app, args.size);
-    let written = encode_png(&picture, PngLevel::Default)
+    let written = encode_png(&picture, PngLevel::default())
         .and_then(|bytes| AtomicFile::write(out, &bytes, true, Folder::MustExist));
     match written {
         Ok(()) => ExitCode::SUCCESS,
@@ -96,6 +97,11 @@ fn window(args: Args) -> ExitCode {
     );
     match shown {
         Ok(()) => ExitCode::SUCCESS,
-        Err(e) => fail(5, &format!("no window can be opened: {e}\nWithout a display, --screenshot OUT.png draws the interface into a file.")),
+        Err(e) => fail(
+            5,
+            &format!(
+                "no window can be opened: {e}\nWithout a display, --screenshot OUT.png draws the interface into a file."
+            ),
+        ),
     }
 }

@@ -16,8 +16,6 @@ pub struct Orbit {
     pub distance: f64,
 }
 
-/// Vertical field of view, radians.
-const FOV: f64 = 0.6;
 /// Radians a pixel.
 const TURN: f64 = 0.008;
 
@@ -28,6 +26,9 @@ impl Default for Orbit {
 }
 
 impl Orbit {
+    /// Vertical field of view, radians.
+    pub const FOV: f64 = 0.6;
+
     /// Right, up, and towards the eye.
     pub fn axes(&self) -> [DVec3; 3] {
         let back = DVec3::new(
@@ -52,7 +53,7 @@ impl Orbit {
 
     /// Move sideways, so that the target's plane follows the pointer in a picture of that height.
     pub fn pan(&mut self, [x, y]: [f32; 2], height: f32) {
-        let metres = 2.0 * self.distance * (0.5 * FOV).tan() / f64::from(height.max(1.0));
+        let metres = 2.0 * self.distance * (0.5 * Orbit::FOV).tan() / f64::from(height.max(1.0));
         let [right, up, _] = self.axes();
         self.target += (up * f64::from(y) - right * f64::from(x)) * metres;
     }
@@ -62,7 +63,7 @@ impl Orbit {
     pub fn zoom(&mut self, factor: f64, at: [f32; 2]) {
         let new = (self.distance / factor.clamp(0.1, 10.0)).clamp(1e-4, 1e7);
         let [right, up, _] = self.axes();
-        let shift = (self.distance - new) * (0.5 * FOV).tan();
+        let shift = (self.distance - new) * (0.5 * Orbit::FOV).tan();
         self.target += (right * f64::from(at[0]) + up * f64::from(at[1])) * shift;
         self.distance = new;
     }
@@ -71,13 +72,13 @@ impl Orbit {
     pub fn frame(&mut self, [low, high]: [DVec3; 2]) {
         if low.is_finite() && high.is_finite() && high.cmpge(low).all() {
             self.target = 0.5 * (low + high);
-            self.distance = (0.55 * (high - low).length() / (0.5 * FOV).sin()).clamp(1e-4, 1e7);
+            self.distance = (0.55 * (high - low).length() / (0.5 * Orbit::FOV).sin()).clamp(1e-4, 1e7);
         }
     }
 
     /// The library's camera; the scene has its origin at `center`.
     pub fn camera(&self, center: DVec3) -> Camera {
-        let projection = Projection::Perspective { fov_y: FOV as f32 };
+        let projection = Projection::Perspective { fov_y: Self::FOV as f32 };
         let (eye, target) = ((self.eye() - center).as_vec3(), (self.target - center).as_vec3());
         let up = self.axes()[1].as_vec3();
         let fallback = Camera::look_at(Vec3::Z, Vec3::ZERO, Vec3::Y, projection);
@@ -106,7 +107,7 @@ impl Lens {
         let v = p - self.orbit.eye();
         let depth = -v.dot(back);
         let (middle, half) = self.half();
-        let scale = half / (depth * (0.5 * FOV).tan());
+        let scale = half / (depth * (0.5 * Orbit::FOV).tan());
         let at = middle + DVec2::new(v.dot(right), -v.dot(up)) * scale;
         (depth > 1e-3 * self.orbit.distance && at.is_finite()).then(|| at.as_vec2().to_array())
     }
@@ -114,7 +115,7 @@ impl Lens {
     /// Origin and unit direction of what is seen at a point of the pane.
     pub fn ray(&self, [x, y]: [f32; 2]) -> (DVec3, DVec3) {
         let (middle, half) = self.half();
-        let at = (DVec2::new(f64::from(x), f64::from(y)) - middle) / half * (0.5 * FOV).tan();
+        let at = (DVec2::new(f64::from(x), f64::from(y)) - middle) / half * (0.5 * Orbit::FOV).tan();
         let [right, up, back] = self.orbit.axes();
         (self.orbit.eye(), (right * at.x - up * at.y - back).normalize())
     }
@@ -122,7 +123,7 @@ impl Lens {
     /// Metres a point of the pane, at a place.
     pub fn metres(&self, at: DVec3) -> f64 {
         let depth = (self.orbit.eye() - at).dot(self.orbit.axes()[2]).max(1e-6);
-        depth * (0.5 * FOV).tan() / self.half().1
+        depth * (0.5 * Orbit::FOV).tan() / self.half().1
     }
 
     /// Where the ray of a point meets a plane; `None` where it runs along it or away.
