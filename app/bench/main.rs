@@ -26,7 +26,9 @@ impl Headless {
     fn new(state: State, size: egui::Vec2) -> Self {
         let mut it = Self { ctx: egui::Context::default(), app: App::new(state), size, time: 0.0 };
         sinew_app::set_up(&it.ctx);
-        (0..5).for_each(|_| drop(it.frame(vec![])));
+        (0..5).for_each(|_| {
+            it.frame(vec![]);
+        });
         it
     }
 
@@ -36,7 +38,8 @@ impl Headless {
         let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, self.size));
         let input = RawInput { screen_rect, time: Some(self.time), events, ..Default::default() };
         let before = processor();
-        let out = self.ctx.run_ui(input, |ui| self.app.ui(ui));
+        let mut out = self.ctx.run_ui(input, |ui| self.app.ui(ui));
+        out.textures_delta.clear();
         let triangles = self.ctx.tessellate(out.shapes, out.pixels_per_point);
         std::hint::black_box(triangles);
         processor() - before
@@ -94,7 +97,9 @@ fn dope() {
             modifiers: Modifiers::NONE,
         };
         let mean = |h: &mut Headless, event: &dyn Fn(usize) -> Vec<Event>| {
-            (0..30).for_each(|i| drop(h.frame(event(i))));
+            (0..30).for_each(|i| {
+                h.frame(event(i));
+            });
             (0..200).map(|i| h.frame(event(i))).sum::<f64>() / 200.0 * 1e3
         };
         let scroll = mean(&mut h, &|_| vec![Event::PointerMoved(names), wheel(-37.0)]);

@@ -16,6 +16,12 @@ pub fn set_up(ctx: &egui::Context) {
     fonts.families.entry(egui::FontFamily::Proportional).or_default().push("Hack".into());
     ctx.set_fonts(fonts);
     ctx.set_theme(egui::Theme::Dark);
+    ctx.style_mut_of(egui::Theme::Dark, |style| {
+        // The light font needs more contrast than the theme gives it.
+        style.visuals.widgets.noninteractive.fg_stroke.color = egui::Color32::from_gray(205);
+        style.visuals.widgets.inactive.fg_stroke.color = egui::Color32::from_gray(215);
+        style.visuals.weak_text_color = Some(egui::Color32::from_gray(150));
+    });
 }
 
 /// What panes ask for while they draw; done when the last has drawn.
@@ -106,7 +112,13 @@ impl App {
         egui::Panel::top("header").show(ui, |ui| panels.header.ui(ui, state, bus));
         egui::Panel::bottom("status").show(ui, |ui| panels.status.ui(ui, state, viewport, bus));
         egui::CentralPanel::no_frame().show(ui, |ui| {
+            let rect = ui.max_rect();
             tree.ui(&mut layout::Panes { state, viewport, panels, bus }, ui);
+            // Automatic keys cannot be missed, wherever one looks.
+            if state.auto_key {
+                let red = egui::Stroke::new(2.0, egui::Color32::from_rgb(220, 40, 40));
+                ui.painter().rect_stroke(rect, 0.0, red, egui::StrokeKind::Inside);
+            }
         });
         jobs.camera = viewport.orbit;
         jobs.ui(&ctx, state, bus);
@@ -127,16 +139,22 @@ impl App {
     fn tick(&mut self, ctx: &egui::Context) {
         let now = ctx.input(|i| i.time);
         let dt = now - self.last_time.replace(now).unwrap_or(now);
-        if self.state.playback.playing.is_some() {
-            let frame = self.state.frame_seconds();
-            if !self.state.playback.every_frame || self.panels.header.due(now, frame) {
-                self.bus.send(Command::Tick(dt));
-            }
-            // Real time shows as many frames as the screen does; every frame waits for its own.
-            let wait =
-                if self.state.playback.every_frame { self.panels.header.wait(now, frame) } else { 0.0 };
-            ctx.request_repaint_after(Duration::from_secs_f64(wait));
+        let p = self.state.playback;
+        if p.playing.is_none() {
+            self.panels.header.stopped();
+            return;
         }
+        // Real time shows as many frames as the screen does; every frame waits for its own.
+        let wait = if p.every_frame {
+            self.panels.header.wait(now, self.state.frame_seconds() / p.speed)
+        } else {
+            0.0
+        };
+        if wait <= 1e-4 {
+            self.panels.header.shown(now);
+            self.bus.send(Command::Tick(dt));
+        }
+        ctx.request_repaint_after(Duration::from_secs_f64(wait));
     }
 
     /// Keys pressed, unless somebody types.

@@ -1,6 +1,6 @@
 //! The tree of bones; rows that can be seen, whatever is there.
 
-use super::dope::menu;
+use super::parts::menu;
 use crate::Bus;
 use crate::state::{Command, Mode, State};
 use egui::{Align2, Color32, FontId, Rect, Sense, Stroke, Vec2, pos2};
