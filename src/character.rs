@@ -229,6 +229,16 @@ impl Character {
         }
     }
 
+    /// Runs of morph weights, each of one mesh instance or of several that move together: the first weight, and how many.
+    pub fn weight_runs(&self) -> Vec<(usize, usize)> {
+        let width = |i: &Instance| self.mesh(i).targets.len();
+        let mut runs: Vec<(usize, usize)> =
+            self.instances.iter().filter(|i| width(i) > 0).map(|i| (i.first_weight, width(i))).collect();
+        runs.sort_unstable();
+        runs.dedup();
+        runs
+    }
+
     /// For each morph weight, how far it moves a vertex at most, metres in the mesh's frame.
     pub fn target_reach(&self) -> Vec<f64> {
         let mut reach = vec![0.0_f64; self.rest_weights.len()];

@@ -87,7 +87,7 @@ fn every_rig_and_its_poses_survive_writing_and_reading() {
         let textures: Vec<String> = asset.textures.iter().map(|_| format!("{name}.png")).collect();
         let rig = rig_json::export(&name, &asset, &textures);
         let c = &asset.character;
-        let poses = rig_json::export_poses(c.skeleton(), c.clips());
+        let poses = rig_json::export_poses(c, c.clips());
         assert!(rig.warnings.is_empty() && poses.warnings.is_empty(), "{name}: {:?}", rig.warnings);
 
         // The same values from the text, and the same text from the values.
@@ -96,14 +96,14 @@ fn every_rig_and_its_poses_survive_writing_and_reading() {
         let fetch = |_: &str| png.as_ref().map(Clone::clone).map_err(|e| e.kind().into());
         let again =
             rig_json::import_bytes(rig.as_bytes(), &Options { textures: true }, &fetch).unwrap().asset;
-        let clips = rig_json::poses_from_bytes(poses.as_bytes(), c.skeleton()).unwrap();
+        let clips = rig_json::poses_from_bytes(poses.as_bytes(), c).unwrap();
         assert!(again.character.skeleton() == c.skeleton(), "{name}: skeleton");
         assert!(again.character.meshes() == c.meshes(), "{name}: meshes");
         assert!(again.character.instances() == c.instances(), "{name}: bindings");
         assert!(again.materials == asset.materials && again.textures == asset.textures, "{name}: look");
         assert!(clips == c.clips(), "{name}: clips");
         assert!(rig_json::export(&name, &again, &textures).document.to_text() == rig, "{name}: text");
-        assert!(rig_json::export_poses(c.skeleton(), &clips).document.to_text() == poses, "{name}: poses");
+        assert!(rig_json::export_poses(c, &clips).document.to_text() == poses, "{name}: poses");
     }
 }
 
@@ -266,13 +266,13 @@ fn broken_files_give_errors_and_never_panic() {
     for path in files("poses", "json") {
         let bytes = std::fs::read(&path).unwrap();
         let rig = files("rigs", "json").into_iter().find(|p| p.file_name() == path.file_name()).unwrap();
-        let skeleton = load(&rig).asset.character.skeleton().clone();
+        let character = load(&rig).asset.character;
         for _ in 0..20 {
             let cut = dice.below(bytes.len() - 2);
-            assert!(rig_json::poses_from_bytes(&bytes[..cut], &skeleton).is_err(), "cut at {cut}");
+            assert!(rig_json::poses_from_bytes(&bytes[..cut], &character).is_err(), "cut at {cut}");
             let mut changed = bytes.clone();
             (0..4).for_each(|_| changed[dice.below(bytes.len())] = b' ' + dice.below(95) as u8);
-            let _ = rig_json::poses_from_bytes(&changed, &skeleton);
+            let _ = rig_json::poses_from_bytes(&changed, &character);
         }
     }
 }

@@ -13,6 +13,8 @@ mod compare;
 #[cfg(all(feature = "io", feature = "pictures"))]
 mod corpus;
 mod deform;
+#[cfg(feature = "cli")]
+mod edits;
 #[cfg(feature = "io")]
 mod gltf;
 #[cfg(feature = "cli")]

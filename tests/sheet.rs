@@ -374,7 +374,7 @@ fn contact_sheets_show_the_clip_from_end_to_end() {
         let mut posed = import.clone();
         let clips = io::rig_json::poses_from_bytes(
             &std::fs::read(path(&dir, poses)).unwrap(),
-            import.asset.character.skeleton(),
+            &import.asset.character,
         );
         posed.asset.character = import.asset.character.clone().with_clips(clips.unwrap()).unwrap();
         let settings = Settings { width: 40, height: 30, ..Default::default() };

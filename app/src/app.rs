@@ -76,6 +76,8 @@ pub struct App {
 
 /// Where settings are kept between runs.
 const KEPT: &str = "sinew-app";
+/// And files that were opened.
+const FILES: &str = "sinew-app files";
 
 impl App {
     /// A document, opened, in panes where they were at first.
@@ -96,6 +98,7 @@ impl App {
         if let Some((tree, view)) = eframe::get_value(storage, KEPT) {
             (self.tree, self.state.view) = (tree, view);
         }
+        self.jobs.recent = eframe::get_value(storage, FILES).unwrap_or_default();
     }
 
     /// One frame.
@@ -117,6 +120,7 @@ impl App {
                 ui.painter().rect_stroke(rect, 0.0, red, egui::StrokeKind::Inside);
             }
         });
+        jobs.camera = viewport.orbit;
         jobs.ui(&ctx, state, bus);
         panels.over(&ctx, state, bus);
         self.settle(&ctx);
@@ -163,7 +167,7 @@ impl App {
             }
             return;
         }
-        if ctx.text_edit_focused() || self.panels.modal() {
+        if ctx.text_edit_focused() || self.panels.modal() || self.jobs.modal() {
             return;
         }
         self.clipboard(ctx);
@@ -227,8 +231,18 @@ impl App {
     fn task(&mut self, ctx: &egui::Context, task: Task) {
         match task {
             Task::ResetLayout => self.tree = layout::default_tree(),
-            Task::Open | Task::Save | Task::SaveAs | Task::Export | Task::Quit => {
+            Task::Open
+            | Task::Save
+            | Task::SaveAs
+            | Task::Export
+            | Task::Still
+            | Task::BakeXzx
+            | Task::BakeQuaternions
+            | Task::Quit => {
                 self.jobs.task(ctx, task, &mut self.state, &mut self.bus);
+            }
+            Task::FrameAll | Task::FrameSelection if self.panels.hovered == Some(Pane::Viewport) => {
+                self.viewport.task(task, &self.state);
             }
             _ => self.panels.task(task, &self.state, &mut self.bus),
         }
@@ -242,5 +256,6 @@ impl eframe::App for App {
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
         eframe::set_value(storage, KEPT, &(&self.tree, &self.state.view));
+        eframe::set_value(storage, FILES, &self.jobs.recent);
     }
 }

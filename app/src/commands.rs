@@ -19,6 +19,12 @@ pub enum Task {
     SaveAs,
     /// Choose what to export.
     Export,
+    /// A picture by rays, as the viewport stands.
+    Still,
+    /// Rotations as XZX angles.
+    BakeXzx,
+    /// Rotations as quaternions.
+    BakeQuaternions,
     /// A search over every action.
     Palette,
     /// The ways that a track can run between its keys.
@@ -160,6 +166,7 @@ pub static ACTIONS: &[Action] = &[
     act("File", "Save", "Write the rig and its poses", with(CTRL, Key::S), Any, always, Window(Task::Save)),
     act("File", "Save as…", "Write the rig and its poses elsewhere", with(CTRL_SHIFT, Key::S), Any, always, Window(Task::SaveAs)),
     act("File", "Export…", "GLB, frames, GIF or a sheet", with(CTRL, Key::E), Any, always, Window(Task::Export)),
+    act("File", "Ray-traced still…", "What the viewport shows, by rays", None, Any, always, Window(Task::Still)),
     act("File", "Quit", "Close the window", with(CTRL, Key::Q), Any, always, Window(Task::Quit)),
     act("Edit", "Undo", "Take the last step back", with(CTRL, Key::Z), Any, |s| s.undo_name().is_some(), Do(|_| vec![Command::Undo])),
     act("Edit", "Redo", "Do the step again", with(CTRL_SHIFT, Key::Z), Any, |s| s.redo_name().is_some(), Do(|_| vec![Command::Redo])),
@@ -217,6 +224,8 @@ pub static ACTIONS: &[Action] = &[
     act("Clip", "New clip", "An empty clip", None, Any, always, Do(|s| edit(Edit::NewClip(format!("clip {}", s.document.clips.len() + 1))))),
     act("Clip", "Mirror clip", "Left does what right did, by bone names", None, Any, |s| !s.active().tracks.is_empty(), Do(|_| edit(Edit::MirrorClip))),
     act("Clip", "Delete clip", "This clip", None, Any, |s| s.document.clips.len() > 1, Do(|_| edit(Edit::DeleteClip))),
+    act("Clip", "Bake to angles", "All rotations as twist, bend, twist; the error is measured", None, Any, always, Window(Task::BakeXzx)),
+    act("Clip", "Bake to quaternions", "All rotations as quaternions, as glTF has them", None, Any, always, Window(Task::BakeQuaternions)),
     act("Help", "What this pane does", "Gestures and keys of the pane under the pointer", with(SHIFT, Key::Questionmark), Any, always, Window(Task::Help)),
 ];
 

@@ -16,7 +16,7 @@ mod tests;
 mod times;
 pub mod xzx;
 
-pub use gauge::{Gauge, Lever, Looks, Metric, Spot, Watch, Worst};
+pub use gauge::{Gauge, Lever, Looks, Metric, Spot, Stage, Watch, Worst};
 pub use pack::{PackedBake, pack};
 
 use crate::character::Character;
@@ -205,7 +205,7 @@ const SEAM: f64 = 1e-3;
 /// # Panics
 /// If the clip is not of the character.
 pub fn bake(character: &Character, clip: &Clip, desc: &BakeDesc) -> Result<Baked, BakeError> {
-    bake_watched(character, clip, desc, &|_| {})
+    bake_watched(character, clip, desc, &|_, _| {})
 }
 
 /// The same, and tell how many poses were compared as it goes.
@@ -222,10 +222,12 @@ pub fn bake_watched(
     watch: Watch,
 ) -> Result<Baked, BakeError> {
     check(character, clip, desc)?;
-    let gauge = Gauge::of(character, desc).watched(watch);
+    let mut gauge = Gauge::of(character, desc).watched(watch);
     let start = start(clip, desc, desc.fps)?;
     let mut plan = Plan::new(character, clip, &start, &gauge, desc);
+    gauge.enter(Stage::Search);
     let mut baked = plan.search(&gauge);
+    gauge.enter(Stage::Check);
     for _ in 0..8 {
         let Verdict { worst, ceiling, moments } = times::verify(&gauge, clip, &baked.clip);
         let report = &mut baked.report;

@@ -1,7 +1,7 @@
 //! How the error is shared among the tracks.
 
 use super::fit::{self, Kind, Samples};
-use super::gauge::Gauge;
+use super::gauge::{Gauge, Looks};
 use super::{BakeDesc, Baked, Goal, Report, SEAM, cubic, edit, times};
 use crate::character::Character;
 use crate::clip::{Clip, Curve, Interpolation, Target, Track};
@@ -91,11 +91,12 @@ impl<'a> Plan<'a> {
     /// The largest shares that keep the bound at the search's moments: all together first, then one after the other.
     pub fn search(&mut self, gauge: &Gauge) -> Baked {
         let aim = 0.97;
+        let looks = gauge.looks(self.clip, &self.moments);
         let mut best = 0.0;
         let (mut low, mut high) = (1e-4, f64::INFINITY);
         for _ in 0..14 {
             self.make_all();
-            let error = gauge.worst(self.clip, &self.assemble(), &self.moments).share();
+            let error = gauge.worst_of(&looks, &self.assemble()).share();
             if error <= aim {
                 (best, low) = (self.share, self.share);
             } else {
@@ -116,12 +117,12 @@ impl<'a> Plan<'a> {
         }
         self.share = best;
         self.make_all();
-        self.widen(gauge, aim);
+        self.widen(gauge, &looks, aim);
         self.finish()
     }
 
     /// Give single tracks more where the worst vertex does not notice.
-    fn widen(&mut self, gauge: &Gauge, aim: f64) {
+    fn widen(&mut self, gauge: &Gauge, looks: &Looks, aim: f64) {
         let mut work = SEARCH_WORK / (self.vertices * self.moments.len()).max(1);
         for factor in [2.5, 1.6, 1.25] {
             // Those with most keys have most to give.
@@ -137,7 +138,7 @@ impl<'a> Plan<'a> {
                 self.make(i);
                 if self.jobs[i].keys() < before {
                     work -= 1;
-                    if gauge.worst(self.clip, &self.assemble(), &self.moments).share() <= aim {
+                    if !gauge.strays(looks, &self.assemble(), aim) {
                         continue;
                     }
                 }

@@ -1,6 +1,7 @@
 //! The command line: parse, call the library, print, choose an exit code. No algorithm lives here.
 
 mod bake;
+mod batch;
 mod compare;
 mod eval;
 mod info;
@@ -88,13 +89,24 @@ impl Failure {
         }
     }
 
-    /// Of two failures the one that says more: while running, then the input's, then the usage.
+    /// Of two failures the one that says more: while running, then the input's, then the usage, then what is not as it should be.
     fn worse(self, other: Self) -> Self {
-        match (&self, &other) {
-            (Failure::Run(_), _) => self,
-            (_, Failure::Run(_)) => other,
-            (Failure::Input(_), _) => self,
-            _ => other,
+        let rank = |f: &Self| match f {
+            Failure::Run(_) => 3,
+            Failure::Input(_) => 2,
+            Failure::Usage(_) => 1,
+            Failure::Differs(_) => 0,
+        };
+        if rank(&self) >= rank(&other) { self } else { other }
+    }
+
+    /// The exit code.
+    fn code(&self) -> u8 {
+        match self {
+            Failure::Run(_) => 1,
+            Failure::Usage(_) => 2,
+            Failure::Input(_) => 3,
+            Failure::Differs(_) => 4,
         }
     }
 
@@ -122,15 +134,9 @@ pub fn run() -> ExitCode {
         Command::Completions { shell } => completions(shell),
         Command::Man { subcommand } => manual(subcommand.as_deref()),
     };
-    let (code, message) = match done {
-        Ok(()) => return ExitCode::SUCCESS,
-        Err(Failure::Run(m)) => (1, m),
-        Err(Failure::Usage(m)) => (2, m),
-        Err(Failure::Input(m)) => (3, m),
-        Err(Failure::Differs(m)) => (4, m),
-    };
-    say.error(&message);
-    ExitCode::from(code)
+    let Err(failure) = done else { return ExitCode::SUCCESS };
+    say.error(failure.message());
+    ExitCode::from(failure.code())
 }
 
 fn completions(shell: clap_complete::Shell) -> Result<(), Failure> {
@@ -184,7 +190,7 @@ fn load_posed(path: &Path, poses: Option<&PathBuf>, options: Options, say: &Say)
                 &"a motion capture stands on a skeleton of its own; expected poses (`sinew_poses`)",
             ));
         }
-        let clips = io::rig_json::poses_from_bytes(&bytes, import.asset.character.skeleton());
+        let clips = io::rig_json::poses_from_bytes(&bytes, &import.asset.character);
         let clips = clips.map_err(|e| bad(&e))?;
         let character = std::mem::take(&mut import.asset.character);
         import.asset.character = character.with_clips(clips).map_err(|e| bad(&e))?;

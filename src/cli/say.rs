@@ -76,6 +76,19 @@ impl Say {
         bar
     }
 
+    /// A bar of clips, with what is being done.
+    pub fn clip_progress(&self, total: usize) -> indicatif::ProgressBar {
+        // One clip may take long as well.
+        let bar = self.progress(total.max(2));
+        bar.set_length(total as u64);
+        if let Ok(style) =
+            indicatif::ProgressStyle::with_template("{pos}/{len} clips [{bar:20}] {elapsed} gone; {msg}")
+        {
+            bar.set_style(style);
+        }
+        bar
+    }
+
     /// A bar for the parts of one picture.
     pub fn picture_progress(&self) -> indicatif::ProgressBar {
         let bar = self.progress(1000);

@@ -12,6 +12,10 @@ pub mod look_json;
 pub mod manifest;
 #[cfg(feature = "io")]
 pub mod notes;
+#[cfg(feature = "io")]
+pub mod obj;
+#[cfg(feature = "io")]
+pub mod pc2;
 #[cfg(feature = "pictures")]
 pub mod picture;
 #[cfg(feature = "io")]
@@ -22,6 +26,10 @@ pub mod rig_json;
 pub mod scene;
 #[cfg(all(feature = "io", feature = "pictures"))]
 pub mod sheet_json;
+#[cfg(feature = "io")]
+pub mod sinew_clip;
+#[cfg(feature = "io")]
+pub mod still;
 #[cfg(feature = "io")]
 pub mod stl;
 

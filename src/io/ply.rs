@@ -66,6 +66,39 @@ pub fn parse(bytes: &[u8]) -> Result<Ply, PlyError> {
     Ok(ply)
 }
 
+/// Write a still as binary little-endian PLY: points, their normals if there are any, and triangles.
+///
+/// ```
+/// use sinew::io::{ply, still::{Still, Surface}};
+/// use glam::Vec3;
+/// let surface = Surface { point: vec![0, 1, 2], triangles: vec![[0, 1, 2]], ..Surface::default() };
+/// let still = Still { points: vec![Vec3::ZERO, Vec3::X, Vec3::Y], surfaces: vec![surface] };
+/// assert_eq!(ply::parse(&ply::write(&still)).unwrap().triangles, [[0, 1, 2]]);
+/// ```
+pub fn write(still: &super::still::Still) -> Vec<u8> {
+    let (normals, triangles) = (still.normals(), still.triangles().collect::<Vec<_>>());
+    let mut head = format!(
+        "ply\nformat binary_little_endian 1.0\ncomment metres, y up\nelement vertex {}\n",
+        still.points.len()
+    );
+    let names = ["x", "y", "z", "nx", "ny", "nz"];
+    for name in &names[..if normals.is_empty() { 3 } else { 6 }] {
+        head += &format!("property float {name}\n");
+    }
+    head +=
+        &format!("element face {}\nproperty list uchar int vertex_indices\nend_header\n", triangles.len());
+    let mut out = head.into_bytes();
+    for (i, p) in still.points.iter().enumerate() {
+        let numbers = p.to_array().into_iter().chain(normals.get(i).into_iter().flat_map(|n| n.to_array()));
+        out.extend(numbers.flat_map(f32::to_le_bytes));
+    }
+    for t in triangles {
+        out.push(3);
+        out.extend(t.iter().flat_map(|i| i.to_le_bytes()));
+    }
+    out
+}
+
 struct Element {
     name: String,
     count: usize,

@@ -75,6 +75,31 @@ pub fn parse(bytes: &[u8]) -> Result<Triangles, StlError> {
     }
 }
 
+/// Write a still as binary STL: what shares a point shares its bits. Formats of units have none; these are metres.
+///
+/// ```
+/// use sinew::io::{still::{Still, Surface}, stl};
+/// use glam::Vec3;
+/// let surface = Surface { point: vec![0, 1, 2], triangles: vec![[0, 1, 2]], ..Surface::default() };
+/// let still = Still { points: vec![Vec3::ZERO, Vec3::X, Vec3::Y], surfaces: vec![surface] };
+/// assert_eq!(stl::parse(&stl::write(&still)).unwrap(), [[Vec3::ZERO, Vec3::X, Vec3::Y]]);
+/// ```
+pub fn write(still: &super::still::Still) -> Vec<u8> {
+    let mut out = vec![0; 84];
+    out[..17].copy_from_slice(b"sinew, metres    ");
+    let mut count = 0_u32;
+    for t in still.triangles() {
+        let [a, b, c] = t.map(|p| still.points[p as usize]);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let numbers = [normal, a, b, c].into_iter().flat_map(|p| p.to_array());
+        out.extend(numbers.flat_map(f32::to_le_bytes));
+        out.extend([0, 0]);
+        count += 1;
+    }
+    out[80..84].copy_from_slice(&count.to_le_bytes());
+    out
+}
+
 /// A normal, three corners and two bytes each.
 fn binary(data: &[u8]) -> Triangles {
     let number = |b: &[u8], k: usize| f32::from_le_bytes([b[k], b[k + 1], b[k + 2], b[k + 3]]);

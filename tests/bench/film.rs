@@ -7,10 +7,11 @@
 //! Each round runs every command once, so a machine that slows down slows all of them. Printed are medians of wall and
 //! processor time over all rounds, the largest resident set of one more run, and the ratios to ours.
 
-use nix::sys::resource::{UsageWho, getrusage};
+mod process;
+
+use process::run;
 use std::path::Path;
-use std::process::{Command, Stdio};
-use std::time::Instant;
+use std::process::Command;
 
 const ROUNDS: usize = 9;
 
@@ -55,21 +56,6 @@ fn entry(text: &str) -> Entry {
     let (name, command) = text.split_once('=').expect("a peer is NAME=COMMAND");
     let words = command.split_whitespace().map(String::from).collect();
     Entry { name: name.into(), words, wall: vec![], cpu: vec![] }
-}
-
-/// Wall and processor seconds of one run.
-fn run(words: &[String]) -> (f64, f64) {
-    let cpu = || {
-        let r = getrusage(UsageWho::RUSAGE_CHILDREN).expect("the system counts");
-        let seconds = |t: nix::sys::time::TimeVal| t.tv_sec() as f64 + t.tv_usec() as f64 * 1e-6;
-        seconds(r.user_time()) + seconds(r.system_time())
-    };
-    let (before, start) = (cpu(), Instant::now());
-    let mut command = Command::new(&words[0]);
-    let done = command.args(&words[1..]).stdout(Stdio::null()).stderr(Stdio::null()).status();
-    let wall = start.elapsed().as_secs_f64();
-    assert!(done.is_ok_and(|s| s.success()), "{words:?} failed");
-    (wall, cpu() - before)
 }
 
 /// Megabytes of the largest resident set, by GNU time where it is installed.

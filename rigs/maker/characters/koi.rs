@@ -167,6 +167,7 @@ fn textured(name: &str, material: &str, b: &Bones, solid: Solid, uvs: &[DVec2], 
         uvs: uvs.iter().map(|p| p.to_array().map(|x| round(x, 4) as f32)).collect(),
         colors: Vec::new(),
         triangles: solid.triangles,
+        ..Default::default()
     }
 }
 

@@ -85,8 +85,19 @@ struct Bench {
     bounds: Vec<f32>,
 }
 
-/// Called with the number of poses compared since the last call.
-pub type Watch<'a> = &'a (dyn Fn(usize) + Sync);
+/// What a bake is at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// How far each bone moves the skin.
+    Levers,
+    /// Which keys to keep.
+    Search,
+    /// Whether the bound holds at all times.
+    Check,
+}
+
+/// Called with what is being done and the number of poses that were compared since the last call.
+pub type Watch<'a> = &'a (dyn Fn(Stage, usize) + Sync);
 
 /// A clip as it is at some moments, to be compared with several others.
 pub struct Looks {
@@ -104,6 +115,7 @@ pub struct Gauge<'a> {
     pub(super) pins: &'a [(BoneId, f64)],
     over: Option<&'a Pose>,
     watch: Option<Watch<'a>>,
+    stage: Stage,
     skins: OnceLock<Vec<Skin>>,
 }
 
@@ -112,7 +124,18 @@ impl<'a> Gauge<'a> {
     pub fn new(character: &'a Character, threads: usize) -> Self {
         let (rest, metric, skins) = (character.rest_pose(), Metric::Vertices, OnceLock::new());
         let threads = threads.max(1);
-        Self { character, rest, threads, limit: 1.0, metric, pins: &[], over: None, watch: None, skins }
+        Self {
+            character,
+            rest,
+            threads,
+            limit: 1.0,
+            metric,
+            pins: &[],
+            over: None,
+            watch: None,
+            stage: Stage::Levers,
+            skins,
+        }
     }
 
     /// For what a bake promises.
@@ -124,6 +147,12 @@ impl<'a> Gauge<'a> {
     /// Tell how the work goes on.
     pub fn watched(self, watch: Watch<'a>) -> Self {
         Self { watch: Some(watch), ..self }
+    }
+
+    /// What comes is part of this.
+    pub(super) fn enter(&mut self, stage: Stage) {
+        self.stage = stage;
+        self.watch.iter().for_each(|w| w(stage, 0));
     }
 
     /// What a clip of no tracks holds: the rest pose, or, where clips are additive, no difference.
@@ -214,6 +243,12 @@ impl<'a> Gauge<'a> {
         found.into_inner()
     }
 
+    /// How far a clip's last pose is from its first.
+    pub fn seam(&self, clip: &Clip) -> Worst {
+        let crate::time::Range { start, end } = clip.range();
+        Worst { time: end, ..self.between(&self.pose(clip, start), &self.pose(clip, end)) }
+    }
+
     /// How far one pose is from another.
     pub fn between(&self, a: &Pose, b: &Pose) -> Worst {
         let mut bench = Bench::default();
@@ -237,7 +272,7 @@ impl<'a> Gauge<'a> {
         let told = |bench: &mut Bench, part: Range<usize>| {
             let count = part.len();
             let out = work(bench, part);
-            self.watch.iter().for_each(|w| w(count));
+            self.watch.iter().for_each(|w| w(self.stage, count));
             out
         };
         if threads == 1 {

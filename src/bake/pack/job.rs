@@ -240,7 +240,7 @@ impl Job {
             let played: Vec<f64> = lists(*code).iter().map(|v| *v as f64 * step_of(*code)).collect();
             error(&played) <= allowed
         };
-        let step = (coarsest.saturating_sub(14)..=coarsest).rev().find(fine)?;
+        let step = (0..=coarsest).rev().find(fine)?;
         let list = lists(step);
         let lanes = (0..self.width).map(|c| list.iter().skip(c).step_by(self.width).copied().collect());
         let base = self.base.map(|b| b.0);

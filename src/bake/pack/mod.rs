@@ -109,31 +109,35 @@ impl<'a> Search<'a> {
 
     /// The largest share for all that keeps the bound at the search's moments.
     fn share(&mut self) {
+        self.bracket(4);
+        // Those that have most numbers have most to gain from a larger part.
+        let each: Vec<f64> = self.jobs.iter().map(|j| (j.numbers() as f64).max(3.0)).collect();
+        let mean = each.iter().sum::<f64>() / each.len().max(1) as f64;
+        self.jobs.iter_mut().zip(each).for_each(|(j, n)| j.weight = (n / mean).sqrt().clamp(0.3, 2.0));
+        self.bracket(9);
+    }
+
+    fn bracket(&mut self, rounds: usize) {
         let (mut low, mut high) = (0.0_f64, f64::INFINITY);
-        for round in 0..9 {
+        for round in 0.. {
             self.make_all();
-            // Those that have most numbers have most to gain from a larger part.
-            if round == 1 {
-                let each: Vec<f64> = self.jobs.iter().map(|j| (j.numbers() as f64).max(3.0)).collect();
-                let mean = each.iter().sum::<f64>() / each.len().max(1) as f64;
-                self.jobs
-                    .iter_mut()
-                    .zip(each)
-                    .for_each(|(j, n)| j.weight = (n / mean).sqrt().clamp(0.3, 2.0));
-                self.make_all();
-                (low, high) = (0.0, f64::INFINITY);
-            }
             let error = self.error();
             if error <= 1.0 {
-                low = low.max(self.share)
+                low = self.share
             } else {
-                high = high.min(self.share)
+                high = self.share
             }
-            if high < 1.04 * low {
+            if high < 1.04 * low || round >= rounds && low > 0.0 || round > 40 {
                 break;
             }
-            let guess = self.share * 0.97 / error.max(1e-3);
-            self.share = if guess > low && guess < high { guess } else { 0.5 * (low + high.min(4.0 * low)) };
+            // Errors grow about as the share does.
+            let guess = self.share * (0.97 / error.max(1e-3)).clamp(0.2, 4.0);
+            let inside = guess > 1.01 * low && guess < 0.99 * high;
+            self.share = if inside {
+                guess
+            } else {
+                (low.max(0.2 * high.min(self.share)) * high.min(4.0 * self.share)).sqrt()
+            };
         }
         self.share = low;
         self.make_all();

@@ -5,12 +5,17 @@ mod report;
 mod values;
 mod write;
 
-use super::{Failure, load, print, say::Say};
+use super::batch::{Names, Outcome};
+use super::{Failure, load, print, say, say::Say};
+use clips::EditArgs;
 use report::Done;
-use sinew::bake::{self, BakeDesc, BakeError, Gauge, Goal, Metric};
-use sinew::io::Options;
-use std::path::PathBuf;
-use values::{Tolerance, factor, fewest, metric, part, pin, tolerance};
+use serde_json::{Value, json};
+use sinew::bake::edit::EditError;
+use sinew::bake::{self, BakeDesc, BakeError, Gauge, Goal, Metric, Stage};
+use sinew::io::{Import, Options};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use values::{Tolerance, fewest, metric, pin, tolerance};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -19,6 +24,10 @@ Examples:
   sinew bake fox.glb -o run.gltf --clip Run --json
   sinew bake fox.glb -o back.glb --clip Walk --trim 0.2..0.6 --reverse --speed 1.5
   sinew bake fox.glb -o all.glb --concat Everything
+  sinew bake walk.glb -o spot.glb --in-place --loop-blend 0.2s --mirror
+  sinew bake wave.glb -o wave-add.glb --additive first --fps 30 --keep-keys
+  sinew bake *.glb -o small/{name}.glb                  many files; one that fails does not stop the others
+  sinew bake fox.glb -o clips/{name}-{clip}.glb         each clip in a file of its own
 
 No vertex of the skin moves by more than the tolerance, at any time: at keys, at frames and between them, compared
 240 times a second or more, with an estimate of what hides between. What was reached is printed
@@ -28,11 +37,12 @@ written and the exit code is 4.";
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// A glTF file (.gltf, .glb).
-    input: PathBuf,
-    /// Where the result goes: .glb, or .gltf with a .bin beside it.
+    /// glTF files (.gltf, .glb).
+    #[arg(required = true, value_name = "INPUT")]
+    inputs: Vec<PathBuf>,
+    /// Where the result goes: .glb, or .gltf with a .bin beside it. {name} and {folder} are the input's, {clip} and {index} make a file a clip.
     #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
+    output: String,
     /// How far any vertex may be off: metres (0.001, 1m, 2cm, 0.5mm) or a part of the rest pose's diagonal (0.02%).
     #[arg(long, value_name = "LENGTH|PERCENT", default_value = "0.01%", value_parser = tolerance)]
     tolerance: Tolerance,
@@ -45,18 +55,6 @@ pub struct Args {
     /// Only this clip, by name or index; all of them by default.
     #[arg(long, value_name = "NAME|INDEX")]
     clip: Option<String>,
-    /// Only this part of each clip, in seconds; either end may be left out.
-    #[arg(long, value_name = "FROM..TO", value_parser = part, allow_hyphen_values = true)]
-    trim: Option<[Option<f64>; 2]>,
-    /// Turn the clips round.
-    #[arg(long)]
-    reverse: bool,
-    /// Play faster: 2 lasts half as long.
-    #[arg(long, value_name = "FACTOR", value_parser = factor, allow_hyphen_values = true)]
-    speed: Option<f64>,
-    /// Join the clips into one of this name.
-    #[arg(long, value_name = "NAME", conflicts_with = "clip")]
-    concat: Option<String>,
     /// What there is to be little of: bytes of the file, or keys to edit, which cubic curves need fewer of.
     #[arg(long, value_name = "bytes|keys", default_value = "bytes", value_parser = fewest)]
     fewest: Goal,
@@ -69,70 +67,175 @@ pub struct Args {
     /// Overwrite an existing file.
     #[arg(short, long)]
     force: bool,
-    /// Print the report as JSON.
+    /// Print the report as JSON: an object, or, where several files are written, a list of one for each with its `input` and its `output`
+    /// or `error`.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    edits: EditArgs,
 }
 
 pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
-    write::check_output(args)?;
-    let import = load(&args.input, Options::default(), say)?;
+    let mut names = Names::new(&args.output)?;
+    write::check_name(&names.example())?;
+    names.tell_apart(args.inputs.len())?;
+    let many = args.inputs.len() > 1 || names.template.tells_clips();
+    let (mut outcome, mut told) = (Outcome::default(), vec![]);
+    for input in &args.inputs {
+        if let Err(failure) = file(args, input, &mut names, &mut told, &mut outcome, say) {
+            if !many {
+                return Err(failure);
+            }
+            told.push(json!({"input": input, "error": failure.message(), "exit": failure.code()}));
+            outcome.fail(failure, say);
+        }
+    }
+    if args.json {
+        let whole = if many { told.into() } else { told.pop().unwrap_or(Value::Null) };
+        print(format!("{whole:#}\n").as_bytes())?;
+    }
+    outcome.sum_up("nothing was written")
+}
+
+/// Bake one input into one file, or into one for each of its clips.
+fn file(
+    args: &Args,
+    input: &Path,
+    names: &mut Names,
+    told: &mut Vec<Value>,
+    outcome: &mut Outcome,
+    say: &Say,
+) -> Result<(), Failure> {
+    let apart = names.template.tells_clips();
+    if !apart {
+        let output = write::claim(args, names, input, "", 0)?;
+        write::check_output(args, names, &output)?;
+        return one(args, &read(args, input, say)?, input, &output, None, told, outcome, say);
+    }
+    let import = read(args, input, say)?;
+    for clip in chosen(args, input, &import)? {
+        let name = &import.asset.character.clips()[clip].name;
+        let output = write::claim(args, names, input, name, clip);
+        let done = output.and_then(|output| {
+            write::check_output(args, names, &output)?;
+            one(args, &import, input, &output, Some(clip), told, outcome, say)
+        });
+        if let Err(failure) = done {
+            told.push(
+                json!({"input": input, "clip": name, "error": failure.message(), "exit": failure.code()}),
+            );
+            outcome.fail(failure, say);
+        }
+    }
+    Ok(())
+}
+
+fn read(_args: &Args, input: &Path, say: &Say) -> Result<Import, Failure> {
+    let import = load(input, Options::default(), say)?;
     if import.format != "glTF" {
-        let message =
-            format!("{}: baking reads glTF files; this is a {}", args.input.display(), import.format);
+        let message = format!("{}: baking reads glTF files; this is a {}", input.display(), import.format);
         return Err(Failure::Usage(message));
     }
+    Ok(import)
+}
+
+fn chosen(args: &Args, input: &Path, import: &Import) -> Result<Vec<usize>, Failure> {
     let clips = import.asset.character.clips();
-    let chosen: Vec<usize> = match super::find_clip(&import, args.clip.as_deref())? {
+    let chosen: Vec<usize> = match super::find_clip(import, args.clip.as_deref())? {
         Some(one) if args.clip.is_some() => vec![one],
         _ => (0..clips.len()).collect(),
     };
     if chosen.is_empty() {
-        return Err(Failure::Input(format!("{}: there are no clips to bake", args.input.display())));
+        return Err(Failure::Input(format!("{}: there are no clips to bake", input.display())));
     }
+    Ok(chosen)
+}
+
+/// What is promised of a file's clips.
+fn desc(args: &Args, import: &Import) -> Result<(BakeDesc, f64), Failure> {
+    let character = &import.asset.character;
     let threads =
         args.threads.map_or_else(|| std::thread::available_parallelism().map_or(1, Into::into), Into::into);
-    let diagonal = Gauge::new(&import.asset.character, threads).diagonal();
+    let diagonal = Gauge::new(character, threads).diagonal();
     let pins = args.pin.iter().map(|(name, limit)| {
-        let bone = import.asset.character.skeleton().find(name);
         let missing =
             || Failure::Usage(format!("--pin {name}: there is no such bone; `sinew info` lists them"));
-        Ok((bone.ok_or_else(missing)?, *limit))
+        Ok((character.skeleton().find(name).ok_or_else(missing)?, *limit))
     });
-    let pins = pins.collect::<Result<_, _>>()?;
-    let metres = match args.tolerance {
+    let tolerance = match args.tolerance {
         Tolerance::Metres(m) => m,
         Tolerance::OfDiagonal(part) => part * diagonal,
     };
     let desc = BakeDesc {
-        tolerance: metres,
+        tolerance,
         metric: args.metric,
-        pins,
+        pins: pins.collect::<Result<_, _>>()?,
         quantize: !args.no_quantize,
         goal: args.fewest,
         threads,
         ..BakeDesc::default()
     };
-    let clips = clips::edited(args, &import, &chosen)?;
-    let bar = say.progress(clips.len());
+    Ok((args.edits.wanted(desc), diagonal))
+}
+
+/// Bake the chosen clips, or this one, into one file.
+fn one(
+    args: &Args,
+    import: &Import,
+    input: &Path,
+    output: &Path,
+    clip: Option<usize>,
+    told: &mut Vec<Value>,
+    outcome: &mut Outcome,
+    say: &Say,
+) -> Result<(), Failure> {
+    let chosen = clip.map_or_else(|| chosen(args, input, import), |c| Ok(vec![c]))?;
+    let (desc, diagonal) = desc(args, import)?;
+    let placed = |f: Failure| {
+        let message = format!("{}: {}", input.display(), f.message());
+        f.with_message(message)
+    };
+    let edited = clips::edited(&args.edits, import, &chosen, &desc, say).map_err(placed)?;
+    let bar = say.clip_progress(edited.len());
     let mut done = vec![];
-    for (clip, replaces) in &clips {
-        let baked = bake::bake(&import.asset.character, clip, &desc).map_err(|e| match e {
-            BakeError::Missed { .. } => Failure::Differs(format!("{}: {e}", args.input.display())),
-            _ => Failure::Usage(format!("{}: {e}", args.input.display())),
-        })?;
-        done.push(Done { clip, replaces: *replaces, baked });
+    for e in &edited {
+        let desc = BakeDesc { cycle: e.cycle, over: e.over.clone(), ..desc.clone() };
+        let poses = AtomicUsize::new(0);
+        let watch = |_: Stage, n: usize| {
+            let all = poses.fetch_add(n, Ordering::Relaxed) + n;
+            bar.set_message(format!(
+                "{}, {}: {all} poses compared",
+                input.display(),
+                say::name(&e.clip.name)
+            ));
+        };
+        let baked = bake::bake_watched(&import.asset.character, &e.clip, &desc, &watch);
+        done.push(Done { edited: e, baked: baked.map_err(failure).map_err(placed)? });
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let told = report::report(&import, &done, args.metric, metres, diagonal);
-    write::write(args, &import, &done, &told)?;
-    if args.json {
-        return print(format!("{told:#}\n").as_bytes());
+    let report = report::report(import, &done, args, desc.tolerance, diagonal);
+    write::write(args, input, output, import, &done, &report)?;
+    outcome.done += 1;
+    for d in done.iter().filter(|_| !args.json) {
+        say.note(&report::line(import, d, diagonal));
     }
-    for d in &done {
-        say.note(&report::line(&import, d, diagonal));
+    let mut report = report;
+    (report["input"], report["output"]) = (json!(input), json!(output));
+    told.push(report);
+    if !args.json {
+        say.note(&format!("wrote {}", output.display()));
     }
-    say.note(&format!("wrote {}", args.output.display()));
     Ok(())
+}
+
+fn failure(e: BakeError) -> Failure {
+    let message = e.to_string();
+    match e {
+        BakeError::Missed { .. } | BakeError::Frames { .. } => Failure::Differs(message),
+        BakeError::Late { .. } | BakeError::Edit(EditError::Times { .. } | EditError::TooManyKeys { .. }) => {
+            Failure::Input(message)
+        }
+        _ => Failure::Usage(message),
+    }
 }

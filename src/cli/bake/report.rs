@@ -1,15 +1,15 @@
 //! What was reached, for people and for programs.
 
+use super::Args;
+use super::clips::Edited;
 use crate::cli::say;
 use serde_json::{Value, json};
 use sinew::bake::{Baked, Metric, Spot};
-use sinew::clip::Clip;
 use sinew::io::Import;
 
 /// A clip, and what was made of it.
 pub(super) struct Done<'a> {
-    pub clip: &'a Clip,
-    pub replaces: Option<usize>,
+    pub edited: &'a Edited,
     pub baked: Baked,
 }
 
@@ -24,7 +24,7 @@ pub(super) fn bone_of(import: &Import, b: &Baked) -> String {
 }
 
 pub(super) fn line(import: &Import, done: &Done, diagonal: f64) -> String {
-    let (clip, r) = (done.clip, &done.baked.report);
+    let (clip, r) = (&done.edited.clip, &done.baked.report);
     format!(
         "{}: {} → {} keys, {} → {} bytes; at most {:.4} mm off ({:.4}% of the diagonal), at {:.3} s on {}",
         say::name(&clip.name),
@@ -47,15 +47,15 @@ pub(super) fn worst(import: &Import, b: &Baked) -> Value {
     worst
 }
 
-pub(super) fn report(import: &Import, done: &[Done], metric: Metric, metres: f64, diagonal: f64) -> Value {
-    let metric_name = match metric {
+pub(super) fn report(import: &Import, done: &[Done], args: &Args, metres: f64, diagonal: f64) -> Value {
+    let metric_name = match args.metric {
         Metric::Vertices => "vertices".to_owned(),
         Metric::Shell(radius) => format!("shell of {radius} m"),
     };
     let clips = done.iter().map(|d| {
         let (b, r) = (&d.baked, &d.baked.report);
-        json!({
-            "clip": d.clip.name,
+        let mut told = json!({
+            "clip": d.edited.clip.name,
             "error": r.ceiling * r.worst.limit,
             "measured": r.worst.distance,
             "limit": r.worst.limit,
@@ -63,7 +63,15 @@ pub(super) fn report(import: &Import, done: &[Done], metric: Metric, metres: f64
             "moments": r.moments,
             "keys": r.keys,
             "bytes": r.bytes,
-        })
+            "loop": d.edited.cycle,
+        });
+        if let Some(motion) = &d.edited.motion {
+            told["rootMotion"] = import.asset.character.skeleton().name(motion.bone).into();
+        }
+        if let Some(from) = args.edits.reference() {
+            told["additive"] = from.into();
+        }
+        told
     });
     json!({"tolerance": metres, "diagonal": diagonal, "metric": metric_name, "clips": clips.collect::<Vec<_>>()})
 }

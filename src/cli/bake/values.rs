@@ -65,3 +65,14 @@ pub(super) fn pin(text: &str) -> Result<(String, f64), String> {
     let pin = text.rsplit_once('=').and_then(|(bone, length)| Some((bone.to_owned(), metres(length)?)));
     pin.ok_or_else(|| "expected a bone and a length, as in LeftFoot=0.01mm".into())
 }
+
+/// `0.2s`, `150ms` or `0.2`.
+pub(super) fn seconds(text: &str) -> Result<f64, String> {
+    let (number, scale) = match text.strip_suffix("ms") {
+        Some(number) => (number, 1e-3),
+        None => (text.strip_suffix('s').unwrap_or(text), 1.0),
+    };
+    let seconds = number.trim().parse::<f64>().map(|n| n * scale);
+    let wrong = || "expected a time above 0, as in 0.2s or 150ms".to_owned();
+    seconds.ok().filter(|s| *s > 0.0 && s.is_finite()).ok_or_else(wrong)
+}

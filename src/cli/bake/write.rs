@@ -2,55 +2,101 @@
 
 use super::Args;
 use super::report::Done;
-use crate::cli::Failure;
-use serde_json::{Map, Value};
+use crate::cli::batch::{self, Names};
+use crate::cli::{Failure, say};
+use serde_json::{Map, Value, json};
 use sinew::io::picture::{AtomicFile, Folder};
 use sinew::io::{self, Import, gltf};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Say so before the work and not after it.
-pub(super) fn check_output(args: &Args) -> Result<(), Failure> {
-    let name = args.output.display();
-    let known =
-        args.output.extension().is_some_and(|e| ["glb", "gltf"].iter().any(|k| e.eq_ignore_ascii_case(k)));
-    if !known {
-        return Err(Failure::Usage(format!("-o {name}: expected a name that ends in .glb or .gltf")));
+pub(super) fn check_name(name: &str) -> Result<(), Failure> {
+    let known = Path::new(name)
+        .extension()
+        .is_some_and(|e| ["glb", "gltf"].iter().any(|k| e.eq_ignore_ascii_case(k)));
+    match known {
+        true => Ok(()),
+        false => Err(Failure::Usage(format!("-o {name}: expected a name that ends in .glb or .gltf"))),
     }
-    if args.output.exists() && !args.force {
+}
+
+/// The output's name, which no other output of this run has.
+pub(super) fn claim(
+    args: &Args,
+    names: &mut Names,
+    input: &Path,
+    clip: &str,
+    index: usize,
+) -> Result<PathBuf, Failure> {
+    let output = PathBuf::from(names.fill(input, clip, index));
+    let source = if clip.is_empty() { String::new() } else { format!("clip {} of ", say::name(clip)) };
+    names.claim(output.clone(), format!("{source}{}", input.display()))?;
+    batch::keep_inputs(args.inputs.iter(), &output)?;
+    Ok(output)
+}
+
+pub(super) fn check_output(args: &Args, names: &Names, output: &Path) -> Result<(), Failure> {
+    let name = output.display();
+    if output.exists() && !args.force {
         return Err(Failure::Run(format!("{name}: the file exists; --force overwrites it")));
     }
-    let folder = args.output.parent().filter(|p| !p.as_os_str().is_empty());
+    if names.template.tells_inputs() || names.template.tells_clips() {
+        return batch::make_folder(output);
+    }
+    let folder = output.parent().filter(|p| !p.as_os_str().is_empty());
     match folder.filter(|f| !f.is_dir()) {
         Some(folder) => Err(Failure::Run(format!("{name}: there is no folder {}", folder.display()))),
         None => Ok(()),
     }
 }
 
-pub(super) fn write(args: &Args, import: &Import, done: &[Done], report: &Value) -> Result<(), Failure> {
-    let bad = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", args.input.display()));
-    let bytes = io::read_file(&args.input).map_err(|e| bad(&e))?;
-    let folder = args.input.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+pub(super) fn write(
+    args: &Args,
+    input: &Path,
+    output: &Path,
+    import: &Import,
+    done: &[Done],
+    report: &Value,
+) -> Result<(), Failure> {
+    let bad = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", input.display()));
+    let bytes = io::read_file(input).map_err(|e| bad(&e))?;
+    let folder = input.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let clips: Vec<gltf::NewClip> = done
         .iter()
-        .map(|d| gltf::NewClip { clip: &d.baked.clip, short: &d.baked.short, replaces: d.replaces })
+        .map(|d| gltf::NewClip { clip: &d.baked.clip, short: &d.baked.short, replaces: d.edited.replaces })
         .collect();
     let extras = Map::from_iter([("sinew".to_owned(), report.clone())]);
-    let name = args.input.display().to_string();
+    let name = input.display().to_string();
     let mut out =
         gltf::with_clips(&bytes, Some(folder), &name, import, &clips, extras).map_err(|e| bad(&e))?;
+    for (i, d) in done.iter().enumerate() {
+        if let Some(from) = args.edits.reference() {
+            out.note(i, "additive", from.into());
+        }
+        if let Some(m) = &d.edited.motion {
+            let bone = import.asset.character.skeleton().name(m.bone);
+            let way: Vec<[f64; 3]> = m.translations.iter().map(|t| t.to_array()).collect();
+            out.note(
+                i,
+                "rootMotion",
+                json!({"bone": bone, "times": m.times, "translations": way, "yaw": m.yaw}),
+            );
+            out.add_moving_node(i, "root motion", &m.times, &way, &m.yaw);
+        }
+    }
     // What lies beside the input is not beside an output in another folder.
-    let there = args.output.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let there = output.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if folder.canonicalize().ok() != there.canonicalize().ok() {
         out.embed_pictures(Some(folder)).map_err(|e| bad(&e))?;
     }
     let put = |path: &Path, bytes: &[u8]| {
         AtomicFile::write(path, bytes, args.force, Folder::MustExist).map_err(|e| Failure::Run(e.to_string()))
     };
-    if args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf")) {
-        let bin = args.output.with_extension("bin");
+    if output.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf")) {
+        let bin = output.with_extension("bin");
         let uri = bin.file_name().unwrap_or_default().to_string_lossy().into_owned();
         put(&bin, &out.bin)?;
-        return put(&args.output, &out.gltf(&uri));
+        return put(output, &out.gltf(&uri));
     }
-    put(&args.output, &out.glb())
+    put(output, &out.glb())
 }

@@ -4,9 +4,10 @@ use super::film::Written;
 use super::stats::{Form, Totals};
 use super::time::Frame;
 use super::{Args, Plan, Task, draw, list, plan};
+use crate::cli::batch::{self, Names, Outcome};
 use crate::cli::{Failure, load_posed, print, say, say::Say};
 use sinew::io::manifest::{self, Failed, FileEntry, FrameEntry, Manifest, Output};
-use sinew::io::picture::{AtomicFile, Fields, Folder, Target, Template};
+use sinew::io::picture::{AtomicFile, Folder, Target};
 use sinew::io::{Import, Options};
 use sinew::time::Shard;
 use std::collections::BTreeMap;
@@ -40,14 +41,11 @@ pub struct BatchArgs {
 struct Batch<'a> {
     args: &'a Args,
     say: &'a Say,
-    template: Template,
+    names: Names,
     /// Pieces of work so far, whichever share they belong to.
     pieces: usize,
-    /// Outputs so far, and where they came from.
-    taken: BTreeMap<PathBuf, String>,
     manifest: Manifest,
-    failures: Vec<Failure>,
-    tasks: usize,
+    outcome: Outcome,
     totals: Totals,
     start: Instant,
 }
@@ -67,28 +65,19 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
 impl<'a> Batch<'a> {
     /// Find what is wrong with the arguments before anything is read.
     fn new(args: &'a Args, say: &'a Say) -> Result<Self, Failure> {
-        let usage = |e: &dyn std::fmt::Display| Failure::Usage(e.to_string());
-        let template = Template::parse(args.output.name()).map_err(|e| usage(&e))?;
-        args.output.target(&template.fill(&Fields {
-            name: "name",
-            folder: "folder",
-            clip: "clip",
-            index: 0,
-        }))?;
+        let names = Names::new(args.output.name())?;
+        args.output.target(&names.example())?;
         args.sheet.settings(args.output.settings(None, args.renderer.coverage())?)?;
-        if args.inputs.len() > 1 && !template.tells_inputs() {
-            let message = "-o: several inputs need {name} (or {folder}) in the output's name";
-            return Err(Failure::Usage(message.into()));
-        }
-        if args.batch.all_clips && !template.tells_clips() {
+        names.tell_apart(args.inputs.len())?;
+        if args.batch.all_clips && !names.template.tells_clips() {
             return Err(Failure::Usage("-o: --all-clips needs {clip} in the output's name".into()));
         }
         if let Some(path) = &args.batch.manifest {
             check_manifest(args, path)?;
         }
-        let (taken, manifest) = (BTreeMap::new(), Manifest::new());
-        let (failures, totals, start) = (vec![], Totals::default(), Instant::now());
-        Ok(Self { args, say, template, pieces: 0, taken, manifest, failures, tasks: 0, totals, start })
+        let (manifest, outcome) = (Manifest::new(), Outcome::default());
+        let (totals, start) = (Totals::default(), Instant::now());
+        Ok(Self { args, say, names, pieces: 0, manifest, outcome, totals, start })
     }
 
     fn run(mut self) -> Result<(), Failure> {
@@ -101,7 +90,7 @@ impl<'a> Batch<'a> {
         if let Some(form) = self.args.batch.stats {
             self.totals.print(form, self.start, self.say);
         }
-        self.sum_up()
+        self.outcome.sum_up("the manifest lists what was written before")
     }
 
     /// One failure among many is told and kept; alone it ends the run.
@@ -111,21 +100,9 @@ impl<'a> Batch<'a> {
         if !many && (mistaken || self.args.batch.manifest.is_none()) {
             return Err(failure);
         }
-        self.say.error(failure.message());
         self.manifest.failed.push(Failed { input: input.to_owned(), error: failure.message().to_owned() });
-        self.failures.push(failure);
+        self.outcome.fail(failure, self.say);
         Ok(())
-    }
-
-    fn sum_up(self) -> Result<(), Failure> {
-        let failed = self.failures.len();
-        let Some(worst) = self.failures.into_iter().reduce(Failure::worse) else { return Ok(()) };
-        let all = self.tasks + failed;
-        Err(worst.with_message(match self.tasks {
-            0 if all == 1 => "the manifest lists what was written before".into(),
-            0 => format!("all {all} outputs failed"),
-            _ => format!("{failed} of {all} outputs failed; the others were written"),
-        }))
     }
 
     fn input(&mut self, input: &Path) -> Result<(), Failure> {
@@ -152,7 +129,7 @@ impl<'a> Batch<'a> {
 
     /// Whether a film or a picture is another share's, or there already: then its input need not be read.
     fn skip_unread(&mut self, input: &Path) -> Result<bool, Failure> {
-        if self.args.batch.all_clips || self.template.tells_clips() {
+        if self.args.batch.all_clips || self.names.template.tells_clips() {
             return Ok(false);
         }
         let target = self.target(input, "", 0)?;
@@ -178,10 +155,7 @@ impl<'a> Batch<'a> {
     }
 
     fn target(&self, input: &Path, clip: &str, index: usize) -> Result<Target, Failure> {
-        let lossy = |s: Option<&std::ffi::OsStr>| s.unwrap_or_default().to_string_lossy().into_owned();
-        let name = lossy(input.file_stem());
-        let folder = lossy(input.parent().and_then(|p| p.file_name()));
-        self.args.output.target(&self.template.fill(&Fields { name: &name, folder: &folder, clip, index }))
+        self.args.output.target(&self.names.fill(input, clip, index))
     }
 
     fn clip(&mut self, input: &Path, import: &Import, clip: Option<usize>) -> Result<(), Failure> {
@@ -210,8 +184,8 @@ impl<'a> Batch<'a> {
         if self.args.batch.dry_run {
             return announce(&task, &plan, all.len(), &companions);
         }
-        if self.template.tells_inputs() || self.template.tells_clips() {
-            make_folder(&target)?;
+        if self.names.template.tells_inputs() || self.names.template.tells_clips() {
+            target.path_of(1).map_or(Ok(()), |p| batch::make_folder(&p))?;
         }
         let done = match plan.frames.is_empty() {
             true => Ok(Written::default()),
@@ -228,7 +202,7 @@ impl<'a> Batch<'a> {
             let kept = all.len() - plan.frames.len();
             self.say.note(&format!("kept {kept} frames of {} that were there", target.name().display()));
         }
-        self.tasks += 1;
+        self.outcome.done += 1;
         match self.args.batch.manifest {
             Some(_) => self.record(&task, clip_name, &all, &plan, done),
             None => Ok(()),
@@ -256,17 +230,7 @@ impl<'a> Batch<'a> {
             Some(clip) => format!("clip {clip} of {}", input.display()),
             None => input.display().to_string(),
         };
-        let path = target.path_of(1).unwrap_or("-".into());
-        match self.taken.get(&path) {
-            Some(other) => Err(Failure::Usage(format!(
-                "{}: {other} and {source} would be written there; tell them apart by {{folder}}, {{name}}, {{clip}} or {{index}}",
-                path.display()
-            ))),
-            None => {
-                self.taken.insert(path, source);
-                Ok(())
-            }
-        }
+        self.names.claim(target.path_of(1).unwrap_or("-".into()), source)
     }
 
     /// After a failure: list the frames of a sequence that were written before it.
@@ -376,16 +340,6 @@ fn check_manifest(args: &Args, path: &Path) -> Result<(), Failure> {
     keep_inputs(args, path)
 }
 
-/// Where names are made from inputs and clips, so are folders.
-fn make_folder(target: &Target) -> Result<(), Failure> {
-    let path = target.path_of(1);
-    let Some(folder) = path.as_deref().and_then(|p| p.parent()).filter(|p| !p.as_os_str().is_empty()) else {
-        return Ok(());
-    };
-    std::fs::create_dir_all(folder)
-        .map_err(|e| Failure::Run(format!("{}: cannot create the folder: {e}", folder.display())))
-}
-
 /// Say what would be written.
 fn announce(task: &Task, plan: &Plan, all: usize, beside: &[PathBuf]) -> Result<(), Failure> {
     let [w, h] = plan.size;
@@ -402,14 +356,7 @@ fn announce(task: &Task, plan: &Plan, all: usize, beside: &[PathBuf]) -> Result<
     print(line.as_bytes())
 }
 
-/// Refuse to write over what is being read, `--force` or not.
+/// Refuse to write over what is being read.
 fn keep_inputs(args: &Args, path: &Path) -> Result<(), Failure> {
-    let Ok(output) = path.canonicalize() else { return Ok(()) };
-    for input in args.inputs.iter().chain(&args.time.poses) {
-        if input.canonicalize().is_ok_and(|i| i == output) {
-            let message = format!("-o {}: this is an input; choose another name", input.display());
-            return Err(Failure::Usage(message));
-        }
-    }
-    Ok(())
+    batch::keep_inputs(args.inputs.iter().chain(&args.time.poses), path)
 }

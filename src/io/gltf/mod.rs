@@ -6,6 +6,8 @@
 mod accessor;
 mod attributes;
 mod bake;
+mod beside;
+mod carried;
 mod clips;
 mod compressed;
 mod container;
@@ -26,9 +28,11 @@ mod textures;
 mod triangles;
 mod uri;
 mod warnings;
+mod write;
 
 pub use error::GltfError;
 pub use rewrite::{NewClip, Rewritten, with_clips};
+pub use write::write;
 
 use super::{Import, Options};
 use crate::asset::Asset;

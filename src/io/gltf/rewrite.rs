@@ -1,5 +1,6 @@
 //! A glTF file with other clips: everything else is carried through, byte for byte where it is binary.
 
+use super::carried;
 use super::container;
 use super::document::Document;
 use super::error::{Result, value};
@@ -33,7 +34,8 @@ pub struct Rewritten {
 }
 
 /// Extensions that name accessors in places that are not known here keep every accessor alive.
-const HARMLESS: [&str; 9] = [
+const HARMLESS: [&str; 10] = [
+    "KHR_animation_pointer",
     "KHR_materials_",
     "KHR_texture_",
     "EXT_texture_",
@@ -63,9 +65,11 @@ pub fn with_clips(
     let mut json: Map<String, Value> =
         serde_json::from_slice(parts.json).map_err(|e| value("the JSON", "an object", e.to_string()))?;
     let old = json.remove("animations").unwrap_or_default();
+    // Channels that nobody here can play keep their keys.
+    json.insert("animations".into(), carried::kept(&old, clips).into());
     drop_accessors(&mut json, &old);
     let mut out = Rewritten { bin: repack(&mut json, &doc), json };
-    out.animate(import, clips, &old)?;
+    out.animate(&Places::of(import), clips, &old)?;
     out.json.entry("asset").or_insert(json!({"version": "2.0"}));
     let asset =
         out.json["asset"].as_object_mut().ok_or_else(|| value("asset", "an object", "something else"))?;
@@ -92,14 +96,7 @@ impl Rewritten {
                 continue;
             }
             let bytes = source.read(&place)?;
-            let view = list(&mut self.json, "bufferViews").len();
-            self.bin.resize(self.bin.len().next_multiple_of(8), 0);
-            let range = json!({"buffer": 0, "byteOffset": self.bin.len(), "byteLength": bytes.len()});
-            list(&mut self.json, "bufferViews").push(range);
-            self.bin.extend(&bytes);
-            if list(&mut self.json, "buffers").is_empty() {
-                list(&mut self.json, "buffers").push(json!({}));
-            }
+            let view = self.view(&bytes);
             if let Some(image) = self.json["images"][i].as_object_mut() {
                 image.remove("uri");
                 image.insert("bufferView".into(), view.into());
@@ -107,6 +104,45 @@ impl Rewritten {
             }
         }
         Ok(())
+    }
+
+    /// An entry of one of the file's lists; its index.
+    pub(super) fn push(&mut self, name: &str, item: Value) -> usize {
+        let list = list(&mut self.json, name);
+        list.push(item);
+        list.len() - 1
+    }
+
+    /// A buffer view of its own for bytes.
+    pub(super) fn view(&mut self, bytes: &[u8]) -> usize {
+        self.bin.resize(self.bin.len().next_multiple_of(8), 0);
+        let range = json!({"buffer": 0, "byteOffset": self.bin.len(), "byteLength": bytes.len()});
+        self.bin.extend(bytes);
+        if list(&mut self.json, "buffers").is_empty() {
+            self.push("buffers", json!({}));
+        }
+        self.push("bufferViews", range)
+    }
+
+    /// An accessor of all of a view of its own.
+    pub(super) fn accessor(&mut self, bytes: &[u8], mut accessor: Value) -> usize {
+        accessor["bufferView"] = self.view(bytes).into();
+        self.push("accessors", accessor)
+    }
+
+    /// Floats, `width` an element; with the smallest and largest of each component where they are asked for.
+    pub(super) fn floats(&mut self, values: &[f32], kind: &str, width: usize, bounds: bool) -> usize {
+        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let mut accessor = json!({"componentType": 5126, "count": values.len() / width, "type": kind});
+        if bounds {
+            let column = |c: usize| values.iter().skip(c).step_by(width).copied();
+            let of = |least: f32, f: fn(f32, f32) -> f32| {
+                (0..width).map(|c| column(c).fold(least, f)).collect::<Vec<_>>()
+            };
+            (accessor["min"], accessor["max"]) =
+                (json!(of(f32::INFINITY, f32::min)), json!(of(f32::NEG_INFINITY, f32::max)));
+        }
+        self.accessor(&bytes, accessor)
     }
 
     /// As one GLB.
@@ -149,25 +185,38 @@ impl Rewritten {
     }
 
     /// Add the clips and their keys.
-    fn animate(&mut self, import: &Import, clips: &[NewClip], old: &Value) -> Result<()> {
-        let mut keys = Keys::default();
-        let mut animations = vec![];
-        for new in clips {
-            let mut animation = new.replaces.map_or(json!({}), |i| old[i].clone());
+    pub(super) fn animate(&mut self, places: &Places, clips: &[NewClip], old: &Value) -> Result<()> {
+        let (mut keys, mut animations) = (Keys::default(), vec![]);
+        let kept = self.json.remove("animations").unwrap_or_default();
+        if clips.is_empty() {
+            return Ok(());
+        }
+        let first = list(&mut self.json, "accessors").len();
+        for (c, new) in clips.iter().enumerate() {
+            let (mut animation, before) = (kept[c].clone(), new.replaces.map_or(&Value::Null, |i| &old[i]));
             animation["name"] = new.clip.name.clone().into();
-            let (mut samplers, mut channels) = (vec![], vec![]);
+            let [mut samplers, mut channels] = ["samplers", "channels"].map(|k| match animation[k].take() {
+                Value::Array(list) => list,
+                _ => vec![],
+            });
             for (i, track) in new.clip.tracks.iter().enumerate() {
-                let sampler = keys.sampler(track, new.short.get(i) == Some(&true))?;
-                for (node, path) in targets(import, &track.target)? {
-                    channels.push(json!({"sampler": samplers.len(), "target": {"node": node, "path": path}}));
+                let mut sampler = keys.sampler(track, new.short.get(i) == Some(&true), first)?;
+                for (node, path) in places.targets(&track.target)? {
+                    let [mut channel, beside] = carried::beside(before, node, path);
+                    channel.insert("sampler".into(), samplers.len().into());
+                    let target = channel.entry("target").or_insert(json!({}));
+                    (target["node"], target["path"]) = (node.into(), path.into());
+                    channels.push(channel.into());
+                    beside.into_iter().for_each(|(key, value)| sampler[key] = value);
                 }
                 samplers.push(sampler);
             }
+            if channels.is_empty() {
+                // An animation of nothing is against the specification.
+                continue;
+            }
             (animation["samplers"], animation["channels"]) = (samplers.into(), channels.into());
             animations.push(animation);
-        }
-        if animations.is_empty() {
-            return Ok(());
         }
         self.json.insert("animations".into(), animations.into());
         self.append(keys);
@@ -175,8 +224,7 @@ impl Rewritten {
     }
 
     /// Put the keys behind what is there.
-    fn append(&mut self, keys: Keys) {
-        let accessors = list(&mut self.json, "accessors").len();
+    pub(super) fn append(&mut self, keys: Keys) {
         let views = list(&mut self.json, "bufferViews").len();
         // Four-byte numbers first, so that both parts are aligned.
         self.bin.resize(self.bin.len().next_multiple_of(4), 0);
@@ -197,26 +245,18 @@ impl Rewritten {
         if list(&mut self.json, "buffers").is_empty() {
             list(&mut self.json, "buffers").push(json!({}));
         }
-        for sampler in
-            list(&mut self.json, "animations").iter_mut().flat_map(|a| a["samplers"].as_array_mut()).flatten()
-        {
-            for end in ["input", "output"] {
-                let k = sampler[end].as_u64().unwrap_or(0) as usize;
-                sampler[end] = (accessors + k).into();
-            }
-        }
     }
 }
 
 /// What kind of picture bytes are.
-fn mime(bytes: &[u8]) -> &'static str {
+pub(super) fn mime(bytes: &[u8]) -> &'static str {
     let heads: [(&[u8], &str); 3] =
         [(b"\xff\xd8", "image/jpeg"), (b"RIFF", "image/webp"), (b"\xabKTX", "image/ktx2")];
     heads.into_iter().find(|h| bytes.starts_with(h.0)).map_or("image/png", |h| h.1)
 }
 
 /// A list of the file; made if there is none.
-fn list<'j>(json: &'j mut Map<String, Value>, name: &str) -> &'j mut Vec<Value> {
+pub(super) fn list<'j>(json: &'j mut Map<String, Value>, name: &str) -> &'j mut Vec<Value> {
     let entry = json.entry(name).or_insert(Value::Array(vec![]));
     if !entry.is_array() {
         *entry = Value::Array(vec![]);
@@ -224,39 +264,56 @@ fn list<'j>(json: &'j mut Map<String, Value>, name: &str) -> &'j mut Vec<Value> 
     entry.as_array_mut().expect("just made")
 }
 
-/// Nodes and the property that a track moves.
-fn targets(import: &Import, target: &Target) -> Result<Vec<(u32, &'static str)>> {
-    let (bone, path) = match target {
-        Target::Translation(b) => (b, "translation"),
-        Target::Rotation(b) => (b, "rotation"),
-        Target::Scale(b) => (b, "scale"),
-        Target::Xzx(b) => {
-            let found = format!("angles of bone {}", b.0);
-            return Err(value("a clip", "rotations", found));
-        }
-        Target::Weights { first } => {
-            let of = import.asset.character.instances().iter().zip(&import.primitives);
-            let mut nodes: Vec<u32> =
-                of.filter(|(i, _)| i.first_weight == *first).map(|(_, p)| p.node).collect();
-            nodes.dedup();
-            return Ok(nodes.into_iter().map(|n| (n, "weights")).collect());
-        }
-    };
-    let node = import.nodes.get(bone.index()).copied().filter(|&n| n != u32::MAX);
-    let missing = || value("a clip", "bones that are nodes of the file", format!("bone {}", bone.0));
-    Ok(vec![(node.ok_or_else(missing)?, path)])
+/// The nodes that tracks move.
+pub(super) struct Places {
+    /// Of each bone; `u32::MAX` for one that is no node.
+    pub bones: Vec<u32>,
+    /// First morph weight of a run, and a node that it morphs.
+    pub weights: Vec<(usize, u32)>,
+}
+
+impl Places {
+    fn of(import: &Import) -> Self {
+        let character = &import.asset.character;
+        let instances = character.instances().iter().zip(&import.primitives);
+        let morphed = instances.filter(|(i, _)| !character.mesh(i).targets.is_empty());
+        let mut weights: Vec<(usize, u32)> = morphed.map(|(i, p)| (i.first_weight, p.node)).collect();
+        weights.dedup();
+        Self { bones: import.nodes.clone(), weights }
+    }
+
+    /// Nodes and the property that a track moves.
+    fn targets(&self, target: &Target) -> Result<Vec<(u32, &'static str)>> {
+        let (bone, path) = match target {
+            Target::Translation(b) => (b, "translation"),
+            Target::Rotation(b) => (b, "rotation"),
+            Target::Scale(b) => (b, "scale"),
+            Target::Xzx(b) => {
+                let found = format!("angles of bone {}", b.0);
+                return Err(value("a clip", "rotations", found));
+            }
+            Target::Weights { first } => {
+                let of = self.weights.iter().filter(|w| w.0 == *first);
+                return Ok(of.map(|w| (w.1, "weights")).collect());
+            }
+        };
+        let node = self.bones.get(bone.index()).copied().filter(|&n| n != u32::MAX);
+        let missing = || value("a clip", "bones that are nodes of the file", format!("bone {}", bone.0));
+        Ok(vec![(node.ok_or_else(missing)?, path)])
+    }
 }
 
 /// Keys of all clips: accessors, and the bytes of those with four-byte and with two-byte numbers.
 #[derive(Default)]
-struct Keys {
+pub(super) struct Keys {
     parts: [Vec<u8>; 2],
     accessors: Vec<(Value, usize)>,
     known: BTreeMap<(Vec<u8>, &'static str), usize>,
 }
 
 impl Keys {
-    fn sampler(&mut self, track: &Track, short: bool) -> Result<Value> {
+    /// A sampler of a track, whose accessors will follow `first` others.
+    pub fn sampler(&mut self, track: &Track, short: bool, first: usize) -> Result<Value> {
         let curve = &track.curve;
         let mode = match curve.interpolation() {
             Interpolation::Hold => "STEP",
@@ -278,7 +335,7 @@ impl Keys {
             true => self.shorts(curve.values()),
             false => self.floats(curve.values(), kind, each),
         };
-        let mut sampler = json!({"input": input, "output": output, "interpolation": mode});
+        let mut sampler = json!({"input": first + input, "output": first + output, "interpolation": mode});
         if mode == "LINEAR" {
             sampler.as_object_mut().expect("an object").remove("interpolation");
         }
@@ -338,8 +395,9 @@ fn primitives(json: &mut Map<String, Value>) -> impl Iterator<Item = &mut Value>
     meshes.filter_map(|m| m.get_mut("primitives")?.as_array_mut()).flatten()
 }
 
-/// Call `visit` on every index of an accessor outside of animations.
+/// Call `visit` on every index of an accessor, of animations only in what is kept of them.
 fn accessor_places(json: &mut Map<String, Value>, visit: &mut impl FnMut(&mut Value)) {
+    carried::accessors(json, visit);
     let mut each =
         |v: &mut Value| v.as_object_mut().into_iter().flat_map(|o| o.values_mut()).for_each(&mut *visit);
     for p in primitives(json) {

@@ -102,7 +102,7 @@ pub struct Material {
 }
 
 /// Triangles and what drives them.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mesh {
     /// For people.
@@ -129,15 +129,37 @@ pub struct Mesh {
     pub colors: Vec<Color>,
     /// Triangles, counter-clockwise in front.
     pub triangles: Vec<[u32; 3]>,
+    /// Blend shapes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub targets: Vec<Target>,
+    /// Which run of morph weights moves the targets, counted from 0: the next one, if absent. Meshes of one run move together.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub morph: Option<usize>,
+    /// Morph weights at rest, one a target; absent: zero.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub weights: Vec<f32>,
+}
+
+/// What a blend shape adds at weight 1.
+#[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Target {
+    /// `V` differences of positions, metres, or none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub positions: Vec<[f32; 3]>,
+    /// `V` differences of normals, or none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub normals: Vec<[f32; 3]>,
 }
 
 /// What drives a mesh.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Bind {
     /// Fixed to a bone and given in its frame, +x along the bone.
     Rigid(String),
     /// Given in rest space; each connected part follows the bone that it is nearest to.
+    #[default]
     Closest,
     /// Given in rest space; linear blend.
     Weights(Weights),

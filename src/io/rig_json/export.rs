@@ -5,11 +5,12 @@ use super::document::{self, Bind, Bone, Rig};
 use super::meshes::bone_from_rest;
 use super::poses::{Clip, Interpolation, Poses, Tangents, Track};
 use crate::asset::Asset;
-use crate::character::{Binding, Instance};
+use crate::character::{Binding, Character, Instance};
 use crate::clip::{self, Curve, Target};
 use crate::fk::Posed;
 use crate::io::Warning;
 use crate::math::spline;
+use crate::mesh::MorphTarget;
 use crate::scene::Material;
 use crate::skeleton::{BoneId, Skeleton};
 use glam::{Affine3A, Quat, Vec3};
@@ -53,11 +54,12 @@ pub fn export(name: &str, asset: &Asset, textures: &[String]) -> Exported<Rig> {
     Exported { document, warnings }
 }
 
-/// The clips of an asset, or any others for its skeleton.
-pub fn export_poses(skeleton: &Skeleton, clips: &[clip::Clip]) -> Exported<Poses> {
+/// The clips of an asset, or any others for its character.
+pub fn export_poses(character: &Character, clips: &[clip::Clip]) -> Exported<Poses> {
     let mut warnings = Vec::new();
-    let names = unique_names(skeleton, &mut warnings);
-    let clips = clips.iter().map(|c| one_clip(c, &names, &mut warnings)).collect();
+    let names = unique_names(character.skeleton(), &mut warnings);
+    let runs = character.weight_runs();
+    let clips = clips.iter().map(|c| one_clip(c, &names, &runs, &mut warnings)).collect();
     Exported { document: Poses { sinew_poses: 1, clips }, warnings }
 }
 
@@ -129,8 +131,11 @@ fn mesh(
     warnings: &mut Vec<Warning>,
 ) -> document::Mesh {
     let mesh = asset.character.mesh(instance);
+    let width = mesh.targets.len();
+    let run = asset.character.weight_runs().iter().position(|r| *r == (instance.first_weight, width));
+    let weights = asset.character.rest_pose().weights;
+    let rest = run.map_or(&[][..], |_| &weights[instance.first_weight..][..width]);
     let lost = [
-        (!mesh.targets.is_empty(), "morph targets"),
         (!mesh.uvs[1].is_empty(), "the second set of texture coordinates"),
         (!mesh.tangents.is_empty(), "tangents"),
     ];
@@ -147,7 +152,15 @@ fn mesh(
         uvs: mesh.uvs[0].iter().map(|p| p.to_array()).collect(),
         colors: mesh.colors.iter().map(|c| Color(*c)).collect(),
         triangles: mesh.triangles.clone(),
+        targets: mesh.targets.iter().map(target).collect(),
+        morph: run,
+        weights: if rest.iter().any(|w| *w != 0.0) { rest.to_vec() } else { vec![] },
     }
+}
+
+fn target(t: &MorphTarget) -> document::Target {
+    let list = |of: &[Vec3]| of.iter().map(|d| d.to_array()).collect();
+    document::Target { positions: list(&t.positions), normals: list(&t.normals) }
 }
 
 fn bind(binding: &Binding, names: &[String], posed: &Posed) -> Bind {
@@ -204,21 +217,21 @@ fn material(
     document
 }
 
-fn one_clip(c: &clip::Clip, names: &[String], warnings: &mut Vec<Warning>) -> Clip {
+fn one_clip(c: &clip::Clip, names: &[String], runs: &[(usize, usize)], warnings: &mut Vec<Warning>) -> Clip {
     let mut tracks = Vec::with_capacity(c.tracks.len());
     for (i, t) in c.tracks.iter().enumerate() {
-        match one_track(t, names) {
+        match one_track(t, names, runs) {
             Some(track) => tracks.push(track),
             None => {
                 let place = format!("clip `{}`, track {i}", c.name);
-                warn(warnings, place, "morph weights left out: a file of poses has none");
+                warn(warnings, place, "weights of no mesh left out");
             }
         }
     }
     Clip { name: c.name.clone(), tracks, ..Default::default() }
 }
 
-fn one_track(t: &clip::Track, names: &[String]) -> Option<Track> {
+fn one_track(t: &clip::Track, names: &[String], runs: &[(usize, usize)]) -> Option<Track> {
     let name = |b: &BoneId| names[b.index()].clone();
     let (interpolation, tangents) = match t.curve.interpolation() {
         clip::Interpolation::Hold => (Interpolation::Hold, None),
@@ -243,7 +256,10 @@ fn one_track(t: &clip::Track, names: &[String]) -> Option<Track> {
             Track { bone: name(b), translation: Some(key_rows(&t.curve, shortest)), ..track }
         }
         Target::Scale(b) => Track { bone: name(b), scale: Some(key_rows(&t.curve, shortest)), ..track },
-        Target::Weights { .. } => return None,
+        Target::Weights { first } => {
+            let run = runs.iter().position(|r| *r == (*first, t.curve.width()))?;
+            Track { morph: Some(run), weights: Some(key_rows(&t.curve, shortest)), ..track }
+        }
     })
 }
 

@@ -57,6 +57,15 @@ fn mesh(out: &mut String, m: &Mesh) {
         list(out, 6, "colors", &m.colors);
     }
     list(out, 6, "triangles", &m.triangles);
+    if !m.targets.is_empty() {
+        list(out, 6, "targets", &m.targets);
+    }
+    if let Some(run) = m.morph {
+        let _ = write!(out, ",\n      \"morph\": {run}");
+    }
+    if !m.weights.is_empty() {
+        let _ = write!(out, ",\n      \"weights\": {}", json(&m.weights));
+    }
     out.push_str("\n    }");
 }
 
@@ -87,7 +96,10 @@ fn clip(out: &mut String, c: &Clip) {
 }
 
 fn track(out: &mut String, t: &Track) {
-    let _ = write!(out, "        {{\"bone\": {}", json(&t.bone));
+    let _ = match t.morph {
+        Some(run) => write!(out, "        {{\"morph\": {run}"),
+        None => write!(out, "        {{\"bone\": {}", json(&t.bone)),
+    };
     if let Some(i) = &t.interpolation {
         let _ = write!(out, ", \"interpolation\": {}", json(i));
     }

@@ -8,7 +8,7 @@ use crate::fk::Posed;
 use crate::io::MAX_CLOSEST;
 use crate::io::Warning;
 use crate::mesh::normals::{self, Weighting};
-use crate::mesh::{MaterialId, Mesh, MeshData};
+use crate::mesh::{MaterialId, Mesh, MeshData, MorphTarget};
 use crate::scene::{AlphaMode, Material, TextureId, TextureRef};
 use crate::skeleton::{BoneId, Skeleton};
 use crate::skin::{Weights, bind_closest};
@@ -24,7 +24,47 @@ pub struct Rest<'a> {
 /// Influences a vertex beyond which a file is a mistake.
 const MAX_INFLUENCES: usize = 32;
 
-/// One mesh, checked and bound; `first_weight` is 0, as the format has no morph targets.
+/// Runs of morph weights, in the order in which meshes name them.
+#[derive(Default)]
+pub struct Runs {
+    /// First weight of each, and how many.
+    all: Vec<(usize, usize)>,
+    /// All weights at rest.
+    pub rest: Vec<f32>,
+}
+
+impl Runs {
+    /// Where the weights of a mesh begin.
+    pub fn first_weight(&mut self, doc: &document::Mesh) -> Result<usize, RigError> {
+        let (width, bad) =
+            (doc.targets.len(), |why: String| RigError::value(format!("mesh `{}`", doc.name), why));
+        if !doc.weights.is_empty() && doc.weights.len() != width {
+            return Err(bad(format!("`weights` has {} entries, expected {width}", doc.weights.len())));
+        }
+        if doc.weights.iter().any(|w| !w.is_finite()) {
+            return Err(bad("a weight is not finite".into()));
+        }
+        let run = match doc.morph {
+            _ if width == 0 => return Ok(0),
+            Some(run) if run > self.all.len() => {
+                return Err(bad(format!("`morph` is {run}, but the next run is {}", self.all.len())));
+            }
+            run => run.unwrap_or(self.all.len()),
+        };
+        if run == self.all.len() {
+            self.all.push((self.rest.len(), width));
+            self.rest.resize(self.rest.len() + width, 0.0);
+        }
+        let (first, count) = self.all[run];
+        if count != width {
+            return Err(bad(format!("has {width} targets, but run {run} has {count}")));
+        }
+        self.rest[first..first + doc.weights.len()].copy_from_slice(&doc.weights);
+        Ok(first)
+    }
+}
+
+/// One mesh, checked and bound; `first_weight` is still 0.
 pub fn mesh(
     id: MeshId,
     doc: &document::Mesh,
@@ -41,6 +81,7 @@ pub fn mesh(
         uvs: [doc.uvs.iter().map(|p| Vec2::from_array(*p)).collect(), Vec::new()],
         colors: doc.colors.iter().map(|c| c.0).collect(),
         triangles: doc.triangles.clone(),
+        targets: doc.targets.iter().map(target).collect(),
         material,
         ..Default::default()
     };
@@ -51,6 +92,11 @@ pub fn mesh(
     let mesh = Mesh::new(data)?;
     let binding = bind(doc, &mesh, &rows, rest, &place, warnings)?;
     Ok((mesh, Instance { mesh: id, binding, first_weight: 0 }))
+}
+
+fn target(doc: &document::Target) -> MorphTarget {
+    let list = |of: &[[f32; 3]]| of.iter().map(|d| Vec3::from_array(*d)).collect();
+    MorphTarget { positions: list(&doc.positions), normals: list(&doc.normals), tangents: vec![] }
 }
 
 fn material_id(name: &str, all: &[document::Material], place: &str) -> Result<MaterialId, RigError> {
@@ -121,6 +167,13 @@ fn split(data: MeshData, crease: f32, rows: &mut Vec<u32>) -> MeshData {
         out.triangles.push(triangle);
     }
     let pick = |i: &u32| *i as usize;
+    let each = |of: &[Vec3]| rows.iter().filter_map(|i| of.get(pick(i)).copied()).collect();
+    let split = |t: &MorphTarget| MorphTarget {
+        positions: each(&t.positions),
+        normals: each(&t.normals),
+        tangents: vec![],
+    };
+    out.targets = data.targets.iter().map(split).collect();
     out.positions = rows.iter().map(|i| data.positions[pick(i)]).collect();
     if !data.uvs[0].is_empty() {
         out.uvs[0] = rows.iter().map(|i| data.uvs[0][pick(i)]).collect();

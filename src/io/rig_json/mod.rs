@@ -13,7 +13,7 @@ mod poses;
 mod texture;
 
 pub use super::json_color::Color;
-pub use document::{Bind, Bone, Material, Mesh, Rig, Weights};
+pub use document::{Bind, Bone, Material, Mesh, Rig, Target, Weights};
 pub use error::RigError;
 pub use export::{Exported, export, export_poses};
 pub use poses::{Clip, Interpolation, Poses, Tangents, Track};
@@ -25,7 +25,6 @@ use crate::clip;
 use crate::fk;
 use crate::io::{Import, Options, read_below, read_file};
 use crate::pose::Pose;
-use crate::skeleton::Skeleton;
 use std::path::Path;
 
 /// Fetches a file that a rig names, by its path relative to the rig, without `.` and needless `..`.
@@ -81,22 +80,23 @@ pub fn import_bytes(bytes: &[u8], options: &Options, fetch: Fetch) -> Result<Imp
     Rig::from_bytes(bytes)?.to_import(options, fetch)
 }
 
-/// The clips of a file of poses, for a skeleton that has their bones.
+/// The clips of a file of poses, for a character that has their bones and morph weights.
 ///
 /// ```
-/// use sinew::io::rig_json::poses_from_bytes;
+/// use sinew::{character::Character, io::rig_json::poses_from_bytes};
 /// use sinew::skeleton::{BoneDesc, Skeleton};
 /// let (skeleton, _) = Skeleton::new(vec![BoneDesc::new("arm")]).unwrap();
+/// let arm = Character::new(skeleton, vec![], vec![], vec![], vec![]).unwrap();
 /// let text = br#"{"sinew_poses": 1, "clips": [{"name": "nod", "tracks": [
 ///     {"bone": "arn", "xzx_deg": [[0, 0,0,0], [1, 0,30,0]]}]}]}"#;
-/// let error = poses_from_bytes(text, &skeleton).unwrap_err().to_string();
+/// let error = poses_from_bytes(text, &arm).unwrap_err().to_string();
 /// assert_eq!(error, "clip `nod`, track 0 of bone `arn`: bone `arn` is none of the 1 bones");
 /// ```
 ///
 /// # Errors
 /// [`RigError`] names clip, track and bone.
-pub fn poses_from_bytes(bytes: &[u8], skeleton: &Skeleton) -> Result<Vec<clip::Clip>, RigError> {
-    Poses::from_bytes(bytes)?.to_clips(skeleton)
+pub fn poses_from_bytes(bytes: &[u8], character: &Character) -> Result<Vec<clip::Clip>, RigError> {
+    Poses::from_bytes(bytes)?.to_clips(character)
 }
 
 impl Rig {
@@ -138,26 +138,29 @@ impl Rig {
 
         // Meshes, each drawn once.
         let rest = meshes::Rest { skeleton: &skeleton, posed: &posed };
-        let (mut all, mut instances) = (Vec::new(), Vec::new());
+        let (mut all, mut instances, mut runs) = (Vec::new(), Vec::new(), meshes::Runs::default());
         for (i, m) in self.meshes.iter().enumerate() {
-            let (mesh, instance) = meshes::mesh(MeshId(i as u32), m, &self.materials, &rest, &mut warnings)?;
+            let (mesh, mut instance) =
+                meshes::mesh(MeshId(i as u32), m, &self.materials, &rest, &mut warnings)?;
+            instance.first_weight = runs.first_weight(m)?;
             all.push(mesh);
             instances.push(instance);
         }
-        let clips = self.fetch_poses(&skeleton, fetch)?;
-        let character = Character::new(skeleton, all, instances, Vec::new(), clips)?;
+        let character = Character::new(skeleton, all, instances, runs.rest, Vec::new())?;
+        let clips = self.fetch_poses(&character, fetch)?;
+        let character = character.with_clips(clips)?;
         let asset = Asset { character, materials, textures: textures.list, ..Default::default() };
         Ok(Import { asset, format: "sinew rig".into(), warnings, ..Default::default() })
     }
 
-    fn fetch_poses(&self, skeleton: &Skeleton, fetch: Fetch) -> Result<Vec<clip::Clip>, RigError> {
+    fn fetch_poses(&self, character: &Character, fetch: Fetch) -> Result<Vec<clip::Clip>, RigError> {
         let mut clips = Vec::new();
         for file in self.poses.iter().flatten() {
             let path = inside_project(file)?;
             let read = |source| RigError::Read { file: file.clone(), source };
             let bytes = fetch(&path).map_err(read)?;
             let inside = |error| RigError::In { file: file.into(), error: Box::new(error) };
-            clips.extend(poses_from_bytes(&bytes, skeleton).map_err(inside)?);
+            clips.extend(poses_from_bytes(&bytes, character).map_err(inside)?);
         }
         Ok(clips)
     }

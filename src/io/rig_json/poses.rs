@@ -2,6 +2,7 @@
 
 use super::bones::find;
 use super::error::RigError;
+use crate::character::Character;
 use crate::clip::{self, Curve, Target};
 use crate::math::{euler, rotation, spline};
 use crate::skeleton::{BoneId, Skeleton};
@@ -44,7 +45,11 @@ pub struct Clip {
 #[serde(deny_unknown_fields)]
 pub struct Track {
     /// Name of the bone.
+    #[serde(default)]
     pub bone: String,
+    /// Instead of a bone: which run of morph weights, counted from 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub morph: Option<usize>,
     /// Overrides the clip's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interpolation: Option<Interpolation>,
@@ -67,6 +72,9 @@ pub struct Track {
     /// Rows of `t, x, y, z`: factors along the bone's axes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scale: Option<Vec<Vec<f64>>>,
+    /// Rows of `t, w₁, …`: the weights of a run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weights: Option<Vec<Vec<f64>>>,
 }
 
 impl Track {
@@ -78,6 +86,7 @@ impl Track {
             ("translation", &self.translation),
             ("offset", &self.offset),
             ("scale", &self.scale),
+            ("weights", &self.weights),
         ];
         all.into_iter().filter_map(|(key, rows)| Some((key, rows.as_ref()?)))
     }
@@ -124,20 +133,25 @@ impl Poses {
         }
     }
 
-    /// The clips, for a skeleton that has their bones.
+    /// The clips, for a character that has their bones and morph weights.
     ///
     /// # Errors
     /// [`RigError`] names clip, track and bone of the first thing that does not fit.
-    pub fn to_clips(&self, skeleton: &Skeleton) -> Result<Vec<clip::Clip>, RigError> {
-        self.clips.iter().map(|c| one_clip(c, skeleton)).collect()
+    pub fn to_clips(&self, character: &Character) -> Result<Vec<clip::Clip>, RigError> {
+        let runs = character.weight_runs();
+        self.clips.iter().map(|c| one_clip(c, character.skeleton(), &runs)).collect()
     }
 }
 
-fn one_clip(c: &Clip, skeleton: &Skeleton) -> Result<clip::Clip, RigError> {
+/// First morph weight of a run, and how many there are.
+type Run = (usize, usize);
+
+fn one_clip(c: &Clip, skeleton: &Skeleton, runs: &[Run]) -> Result<clip::Clip, RigError> {
     let mut out = clip::Clip { name: c.name.clone(), tracks: Vec::with_capacity(c.tracks.len()) };
     for (i, t) in c.tracks.iter().enumerate() {
-        let place = format!("clip `{}`, track {i} of bone `{}`", c.name, t.bone);
-        out.tracks.push(one_track(c, t, skeleton, &place)?);
+        let of = t.morph.map_or_else(|| format!("bone `{}`", t.bone), |run| format!("morph run {run}"));
+        let place = format!("clip `{}`, track {i} of {of}", c.name);
+        out.tracks.push(one_track(c, t, skeleton, runs, &place)?);
     }
     if c.repeats {
         one_length(&out)?;
@@ -162,16 +176,36 @@ fn one_length(clip: &clip::Clip) -> Result<(), RigError> {
     Ok(())
 }
 
-fn one_track(c: &Clip, t: &Track, skeleton: &Skeleton, place: &str) -> Result<clip::Track, RigError> {
-    let bone = find(skeleton, &t.bone, place)?;
+fn one_track(
+    c: &Clip,
+    t: &Track,
+    skeleton: &Skeleton,
+    runs: &[Run],
+    place: &str,
+) -> Result<clip::Track, RigError> {
     let mut channels = t.channels();
     let (Some((channel, rows)), None) = (channels.next(), channels.next()) else {
-        let why = "expected keys of exactly one of `xzx_deg`, `rotation`, `translation`, `offset`, `scale`";
+        let why = "expected keys of exactly one of `xzx_deg`, `rotation`, `translation`, `offset`, `scale`, `weights`";
         return Err(RigError::value(place, why));
     };
+    if (channel == "weights") != t.morph.is_some() {
+        return Err(RigError::value(place, "`weights` and `morph` belong together"));
+    }
+    let (target, width, origin) = match t.morph {
+        Some(run) => {
+            let why = || format!("there are {} runs of morph weights", runs.len());
+            let &(first, width) = runs.get(run).ok_or_else(|| RigError::value(place, why()))?;
+            (Target::Weights { first }, width, Vec3::ZERO)
+        }
+        None => {
+            let bone = find(skeleton, &t.bone, place)?;
+            let width = if channel == "rotation" { 4 } else { 3 };
+            (target(channel, bone), width, skeleton.rest(bone).translation)
+        }
+    };
     let interpolation = t.interpolation.unwrap_or(c.interpolation);
-    let keys = Keys::read(channel, rows, interpolation == Interpolation::Hermite, place)?;
-    let mut keys = keys.in_engine_units(channel, skeleton.rest(bone).translation);
+    let keys = Keys::read(channel, rows, width, interpolation == Interpolation::Hermite, place)?;
+    let mut keys = keys.in_engine_units(channel, origin);
     if channel == "rotation" && interpolation != Interpolation::Hold {
         keys.align_signs();
     }
@@ -180,7 +214,6 @@ fn one_track(c: &Clip, t: &Track, skeleton: &Skeleton, place: &str) -> Result<cl
         Tangents::ThreePoint => spline::Tangents::ThreePoint,
         Tangents::Monotone => spline::Tangents::Monotone,
     };
-    let target = target(channel, bone);
     let curve = if c.repeats && keys.times.len() > 1 {
         keys.check_seam(&target, place)?;
         keys.into_loop(interpolation, rule)
@@ -205,15 +238,23 @@ struct Keys {
     times: Vec<f64>,
     values: Vec<f64>,
     width: usize,
+    /// They are quaternions.
+    turns: bool,
     /// Slopes are in `values`.
     sloped: bool,
 }
 
 impl Keys {
-    fn read(channel: &str, rows: &[Vec<f64>], sloped: bool, place: &str) -> Result<Self, RigError> {
-        let width = if channel == "rotation" { 4 } else { 3 };
+    fn read(
+        channel: &str,
+        rows: &[Vec<f64>],
+        width: usize,
+        sloped: bool,
+        place: &str,
+    ) -> Result<Self, RigError> {
         let each = if sloped { 3 * width } else { width };
-        let mut out = Self { times: Vec::new(), values: Vec::new(), width, sloped };
+        let turns = channel == "rotation";
+        let mut out = Self { times: Vec::new(), values: Vec::new(), width, turns, sloped };
         for (k, row) in rows.iter().enumerate() {
             if row.len() != each + 1 {
                 let why = format!(
@@ -295,8 +336,8 @@ impl Keys {
         let (first, end) = (at(0).1, at(last).1);
 
         // A loop may end whole turns away from its start, or on the other sign of a quaternion: carry that across.
-        let sign = if self.width == 4 && self.seam_dot() < 0.0 { -1.0 } else { 1.0 };
-        let turn = if self.width == 4 { 0.0 } else { end - first };
+        let sign = if self.turns && self.seam_dot() < 0.0 { -1.0 } else { 1.0 };
+        let turn = if self.turns { 0.0 } else { end - first };
         let prev = match k {
             0 => (at(last - 1).0 - period, sign * at(last - 1).1 - turn),
             _ => at(k - 1),

@@ -86,7 +86,7 @@ fn mistakes_are_named() {
 
 #[test]
 fn a_loop_runs_over_its_seam_without_a_kink() {
-    let skeleton = read(ARM).unwrap().asset.character.skeleton().clone();
+    let arm = read(ARM).unwrap().asset.character;
     let text = |rows: &str| {
         format!(
             r#"{{"sinew_poses": 1, "clips": [{{"name": "sway", "loop": true, "interpolation": "catmull-rom",
@@ -94,7 +94,7 @@ fn a_loop_runs_over_its_seam_without_a_kink() {
         )
     };
     let clips =
-        poses_from_bytes(text("[0,0,0,0],[1,0,30,0],[2,0,0,0],[3,0,-30,0],[4,0,0,0]").as_bytes(), &skeleton);
+        poses_from_bytes(text("[0,0,0,0],[1,0,30,0],[2,0,0,0],[3,0,-30,0],[4,0,0,0]").as_bytes(), &arm);
     let curve = &clips.unwrap()[0].tracks[0].curve;
     let bend = |t: f64| {
         let mut v = [0.0; 3];
@@ -106,7 +106,7 @@ fn a_loop_runs_over_its_seam_without_a_kink() {
     assert!((slope(0.0, 1e-3) - 30_f64.to_radians()).abs() < 1e-2);
     assert_eq!((curve.range().unwrap().start, curve.range().unwrap().end), (0.0, 4.0));
 
-    let open = poses_from_bytes(text("[0,0,0,0],[1,0,30,0]").as_bytes(), &skeleton).unwrap_err().to_string();
+    let open = poses_from_bytes(text("[0,0,0,0],[1,0,30,0]").as_bytes(), &arm).unwrap_err().to_string();
     assert!(open.contains("the last key of a loop must repeat the first"), "{open}");
 }
 
@@ -152,12 +152,12 @@ fn weights_that_do_not_sum_to_one_are_scaled_with_a_warning() {
 
 #[test]
 fn offsets_start_from_rest_and_channels_exclude_each_other() {
-    let skeleton = read(ARM).unwrap().asset.character.skeleton().clone();
+    let arm = read(ARM).unwrap().asset.character;
     let clip = |track: &str| {
         let text = format!(
             r#"{{"sinew_poses": 1, "clips": [{{"name": "c", "tracks": [{{"bone": "hand", {track}}}]}}]}}"#
         );
-        poses_from_bytes(text.as_bytes(), &skeleton)
+        poses_from_bytes(text.as_bytes(), &arm)
     };
     let moved = clip(r#""offset": [[0, 0.5, 0, 0]]"#).unwrap();
     assert_eq!(moved[0].tracks[0].curve.value(0), [1.5, 0.0, 0.0]);
@@ -174,7 +174,7 @@ fn offsets_start_from_rest_and_channels_exclude_each_other() {
 
 #[test]
 fn both_signs_of_a_quaternion_are_one_rotation() {
-    let skeleton = read(ARM).unwrap().asset.character.skeleton().clone();
+    let arm = read(ARM).unwrap().asset.character;
     // A tenth of a radian to and fro, once not at all; every other key is written with the other sign.
     let q = glam::Quat::from_xyzw(0.5, 0.5, 0.5, 0.5);
     let turned = -(q * glam::Quat::from_rotation_x(0.1));
@@ -189,7 +189,7 @@ fn both_signs_of_a_quaternion_are_one_rotation() {
             r#"{{"sinew_poses": 1, "clips": [{{"name": "c", "loop": {repeats}, "interpolation": "{kind}",
             "tracks": [{{"bone": "arm", "rotation": [{rows}]}}]}}]}}"#
         );
-        let clip = &poses_from_bytes(text.as_bytes(), &skeleton).unwrap()[0];
+        let clip = &poses_from_bytes(text.as_bytes(), &arm).unwrap()[0];
         for i in 0..=500 {
             let found = clip.tracks[0].curve.sample_rotation(i as f64 * 0.01);
             let off = crate::math::rotation::angle_between(found, q);

@@ -166,6 +166,7 @@ impl Machine {
                 uvs: Vec::new(),
                 colors: Vec::new(),
                 triangles: solid.triangles,
+                ..Default::default()
             });
         }
     }

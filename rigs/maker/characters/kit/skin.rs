@@ -35,6 +35,7 @@ pub fn skin(
         normals: Vec::new(),
         uvs: Vec::new(),
         triangles: solid.triangles,
+        ..Default::default()
     }
 }
 
