@@ -1,5 +1,7 @@
 //! Promises of the editor, one binary.
 
+mod keys;
+mod person;
 mod random;
 mod session;
 
