@@ -25,6 +25,8 @@ mod looks;
 mod picture;
 mod raster;
 mod ray;
+#[cfg(feature = "io")]
+mod retarget;
 #[path = "../src/test_rng.rs"]
 mod rng;
 #[cfg(feature = "cli")]
@@ -35,3 +37,5 @@ mod sheet;
 mod shots;
 #[cfg(all(feature = "io", feature = "pictures"))]
 mod views;
+#[cfg(all(feature = "io", feature = "pictures"))]
+mod xzx;
