@@ -151,7 +151,7 @@ fn interpolate(to: Interpolation) -> Vec<Command> {
     edit(Edit::SetInterpolation(to))
 }
 
-/// Next to the playhead: a key in a direction, or where it stands.
+/// Next to the playhead: a key in a direction, or nothing. A look at every track, so it is not asked whether there is one until somebody does.
 fn to_key(s: &State, forward: bool) -> Vec<Command> {
     s.neighbour_key(forward).map(Command::SetTime).into_iter().collect()
 }
@@ -199,8 +199,8 @@ pub static ACTIONS: &[Action] = &[
     act("Time", "Previous frame", "The playhead a frame back", key(Key::ArrowLeft), Any, always, Do(|s| vec![Command::SetTime(s.time_of(s.frame_at(s.time - 1e-9).ceil() - 1.0))])),
     act("Time", "To the end", "The last frame of the range", with(SHIFT, Key::ArrowRight), Any, always, Do(|s| vec![Command::SetTime(s.playback.range.end)])),
     act("Time", "To the start", "The first frame of the range", with(SHIFT, Key::ArrowLeft), Any, always, Do(|s| vec![Command::SetTime(s.playback.range.start)])),
-    act("Time", "Next key", "The next key of the selected bones, or of all", key(Key::ArrowUp), Any, |s| s.neighbour_key(true).is_some(), Do(|s| to_key(s, true))),
-    act("Time", "Previous key", "The key before", key(Key::ArrowDown), Any, |s| s.neighbour_key(false).is_some(), Do(|s| to_key(s, false))),
+    act("Time", "Next key", "The next key of the selected bones, or of all", key(Key::ArrowUp), Any, always, Do(|s| to_key(s, true))),
+    act("Time", "Previous key", "The key before", key(Key::ArrowDown), Any, always, Do(|s| to_key(s, false))),
     act("Time", "Marker", "Name the moment at the playhead", key(Key::M), Any, always, Do(|s| edit(Edit::SetMarker(Marker { time: s.time, name: format!("M{}", s.active().markers.len() + 1) })))),
     act("Time", "Remove marker", "Forget the marker at the playhead", with(SHIFT, Key::M), Any, |s| s.active().markers.iter().any(|m| (m.time - s.time).abs() < 1e-6), Do(|s| edit(Edit::RemoveMarker(s.time)))),
     act("Time", "Preview from here", "What is played starts at the playhead", key(Key::OpenBracket), Any, always, Do(|s| playback(s, |p| p.range.start = s.time))),

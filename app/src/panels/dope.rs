@@ -83,12 +83,21 @@ fn blocks(axis: &Axis, times: &[f64]) -> Vec<Block> {
     let seen = axis.visible(times);
     let (mut out, mut k) = (Vec::new(), seen.start);
     while k < seen.end {
-        let limit = times[k] + APART * axis.scale;
-        let end = k + 1 + times[k + 1..seen.end].partition_point(|&t| t < limit);
+        let end = first_from(times, k + 1, seen.end, times[k] + APART * axis.scale);
         out.push(Block { keys: k..end, from: axis.x(times[k]), to: axis.x(times[end - 1]) });
         k = end;
     }
     out
+}
+
+/// The first key in `from..end` at `limit` or later: by strides that double, since it is near.
+fn first_from(times: &[f64], from: usize, end: usize, limit: f64) -> usize {
+    let (mut low, mut stride) = (from, 1);
+    while low + stride < end && times[low + stride] < limit {
+        low += stride;
+        stride *= 2;
+    }
+    low + times[low..end.min(low + stride + 1)].partition_point(|&t| t < limit)
 }
 
 impl Dope {
