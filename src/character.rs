@@ -201,6 +201,20 @@ impl Character {
         Ok(self)
     }
 
+    /// The same character with at most `k` influences a vertex: the largest, scaled to sum 1.
+    ///
+    /// # Panics
+    /// If `k` is 0.
+    pub fn with_influences(&self, k: usize) -> Self {
+        let mut out = self.clone();
+        for i in &mut out.instances {
+            if let Binding::Skin { weights, .. } = &mut i.binding {
+                *weights = weights.strongest(k);
+            }
+        }
+        out
+    }
+
     /// The bones that move a vertex of an instance.
     ///
     /// # Panics
@@ -215,6 +229,16 @@ impl Character {
         one.into_iter().chain(skinned.filter(|s| s.1 > 0.0).map(|s| s.0))
     }
 
+    /// Runs of morph weights, each of one mesh instance or of several that move together: the first weight, and how many.
+    pub fn weight_runs(&self) -> Vec<(usize, usize)> {
+        let width = |i: &Instance| self.mesh(i).targets.len();
+        let mut runs: Vec<(usize, usize)> =
+            self.instances.iter().filter(|i| width(i) > 0).map(|i| (i.first_weight, width(i))).collect();
+        runs.sort_unstable();
+        runs.dedup();
+        runs
+    }
+
     /// The bone that moves a vertex of an instance most; `None` where none does.
     ///
     /// # Panics
@@ -227,16 +251,6 @@ impl Character {
                 most.filter(|m| m.1 > 0.0).map(|m| palette[m.0].0)
             }
         }
-    }
-
-    /// Runs of morph weights, each of one mesh instance or of several that move together: the first weight, and how many.
-    pub fn weight_runs(&self) -> Vec<(usize, usize)> {
-        let width = |i: &Instance| self.mesh(i).targets.len();
-        let mut runs: Vec<(usize, usize)> =
-            self.instances.iter().filter(|i| width(i) > 0).map(|i| (i.first_weight, width(i))).collect();
-        runs.sort_unstable();
-        runs.dedup();
-        runs
     }
 
     /// For each morph weight, how far it moves a vertex at most, metres in the mesh's frame.
@@ -351,6 +365,15 @@ impl Character {
         let rest = self.morph(instance, pose, morphed);
         let method = self.palette(instance, posed, center, palette);
         skin::deform_positions(method, rest.positions, palette, out);
+    }
+
+    /// Rest positions of an instance under the pose's morph weights.
+    ///
+    /// # Panics
+    /// If `instance` or `pose` are not of this character.
+    pub(crate) fn morphed(&self, instance: usize, pose: &Pose, scratch: &mut Scratch, out: &mut Vec<Vec3>) {
+        out.clear();
+        out.extend(self.morph(instance, pose, &mut scratch.morphed).positions);
     }
 
     /// World positions of an instance, all in f64: the slow reference for [`positions`](Self::positions). `bones` are

@@ -45,8 +45,8 @@ const ROOMS: &[(&str, &[&str])] = &[
         ],
     ),
     ("measure", &["image"]),
-    // Curves to curves, measured on the skin: never a file, never a picture.
-    ("bake", &["math", "time", "skeleton", "pose", "clip", "fk", "character"]),
+    // Curves to curves, measured on the skin, whose weights bound what must be looked at: never a file, never a picture.
+    ("bake", &["math", "time", "skeleton", "pose", "clip", "fk", "mesh", "skin", "character"]),
     // Frames side by side, wherever they came from: it cuts and copies, and never draws.
     ("sheet", &["time", "image"]),
     // Formats: data rooms only, never frames or render.

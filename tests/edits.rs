@@ -59,10 +59,10 @@ const SECONDS: f32 = 1.0;
 /// A body of three parts that walks in a bow while its left arm waves: below a node that is turned and scaled, as some programs write it.
 fn walker(end: f32) -> Vec<u8> {
     let mut f = File::default();
-    let mesh = f.floats(&[0.0, 0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 0.2, 0.1], "VEC3");
-    let times: Vec<f32> =
-        (0..=30).map(|k| k as f32 / 30.0 * SECONDS).map(|t| if t == SECONDS { end } else { t }).collect();
-    let t = f.floats(&times, "SCALAR");
+    let mesh = f.floats(&[0.0, 0.0, 0.0, 30.0, 0.0, 0.0, 0.0, 20.0, 10.0], "VEC3");
+    let times: Vec<f32> = (0..=30).map(|k| k as f32 / 30.0 * SECONDS).collect();
+    let keyed: Vec<f32> = times[..30].iter().copied().chain([end]).collect();
+    let t = f.floats(&keyed, "SCALAR");
     let phase = |t: &f32| (t / SECONDS * std::f32::consts::TAU, *t);
     // z is up below the turned node, and its unit is a centimetre.
     let way: Vec<f32> =

@@ -60,6 +60,13 @@ impl Samples {
         out
     }
 
+    /// Without the points between keys, so that keys are chosen among keys.
+    pub fn at_keys(self) -> Self {
+        let values = self.own.iter().flat_map(|&i| self.value(i).to_vec()).collect();
+        let times: Vec<f64> = self.own.iter().map(|&i| self.times[i]).collect();
+        Self { own: (0..times.len()).collect(), times, values, ..self }
+    }
+
     fn between(&mut self, curve: &Curve, from: f64, to: f64) {
         match curve.interpolation() {
             // The value that is held, up to the jump.

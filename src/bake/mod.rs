@@ -9,6 +9,7 @@ mod cubic;
 pub mod edit;
 mod fit;
 mod gauge;
+pub mod influences;
 mod pack;
 mod plan;
 #[cfg(test)]

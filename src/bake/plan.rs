@@ -72,7 +72,10 @@ impl<'a> Plan<'a> {
                     (Kind::Weights, reach, rest.weights[run].to_vec())
                 }
             };
-            let samples = Samples::of(&track.curve, kind);
+            let mut samples = Samples::of(&track.curve, kind);
+            if desc.fps.is_some() && track.curve.interpolation() == Interpolation::Linear {
+                samples = samples.at_keys();
+            }
             let job = Job {
                 target: track.target.clone(),
                 source: track.curve.clone(),

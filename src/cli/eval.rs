@@ -29,8 +29,8 @@ pub struct Args {
     /// Clip by name or index; the first by default.
     #[arg(long, value_name = "NAME|INDEX", conflicts_with = "rest")]
     clip: Option<String>,
-    /// Clips from this file instead of the input's.
-    #[arg(long, value_name = "FILE")]
+    /// Clips from this file instead of the input's: poses (.json) or packed clips (.sinew).
+    #[arg(long, value_name = "FILE", visible_alias = "motion")]
     poses: Option<PathBuf>,
     /// Seconds, separated by commas.
     #[arg(

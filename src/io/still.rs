@@ -1,9 +1,11 @@
 //! A character as it stands at one moment: surfaces in world space, for formats that know no bones.
 
 use crate::asset::Asset;
-use crate::character::{Binding, Character, Scratch};
-use crate::mesh::MaterialId;
+use crate::character::{Binding, Character, Instance, MeshId, Scratch};
+use crate::clip::{Clip, Curve, Interpolation, Target, Track};
+use crate::mesh::{MaterialId, Mesh, MeshData, MorphTarget};
 use crate::pose::Pose;
+use crate::skeleton::{BoneDesc, Skeleton};
 use crate::skin::Deformed;
 use glam::{DVec3, Vec2, Vec3};
 use std::collections::BTreeMap;
@@ -150,6 +152,71 @@ impl<'a> Stance<'a> {
         }
         out
     }
+}
+
+/// A character that stands as `character` does in the first of these poses, and whose one clip runs through them all, `fps` to the second: each further
+/// pose is a morph target whose weight rises from the frame before it and falls towards the one after. Between frames vertices so move on
+/// straight lines.
+///
+/// # Panics
+/// If there is no pose, or one is of another character.
+pub fn frozen(character: &Character, poses: &[Pose], fps: f64, name: &str) -> Character {
+    let targets = poses.len() - 1;
+    let mut meshes = vec![];
+    let mut deformed: Vec<Vec<(Deformed, DVec3)>> = vec![];
+    let mut scratch = Scratch::default();
+    for pose in poses {
+        let posed = character.posed(pose);
+        let center = character.center(&posed);
+        let each = (0..character.instances().len()).map(|i| {
+            let mut d = Deformed::default();
+            character.deform(i, pose, &posed, center, &mut scratch, &mut d);
+            (d, center)
+        });
+        deformed.push(each.collect());
+    }
+    for (i, instance) in character.instances().iter().enumerate() {
+        let (first, center) = &deformed[0][i];
+        let mut data = MeshData::clone(character.mesh(instance));
+        let world = |(d, center): &(Deformed, DVec3)| -> Vec<DVec3> {
+            d.positions.iter().map(|p| *center + p.as_dvec3()).collect()
+        };
+        let base = world(&(first.clone(), *center));
+        data.positions = base.iter().map(|p| p.as_vec3()).collect();
+        (data.normals, data.tangents) = (first.normals.clone(), first.tangents.clone());
+        if first.mirrored {
+            data.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        }
+        let target = |d: &Vec<(Deformed, DVec3)>| {
+            let moved = world(&d[i])
+                .iter()
+                .zip(&data.positions)
+                .map(|(p, b)| (*p - b.as_dvec3()).as_vec3())
+                .collect();
+            let turned = d[i].0.normals.iter().zip(&first.normals).map(|(n, b)| *n - *b).collect();
+            MorphTarget { positions: moved, normals: turned, tangents: vec![] }
+        };
+        data.targets = deformed[1..].iter().map(target).collect();
+        meshes.push(Mesh::new(data).expect("a mesh that was one before"));
+    }
+    let (skeleton, bones) = Skeleton::new(vec![BoneDesc::new(name)]).expect("one bone");
+    let instance =
+        |i: usize| Instance { mesh: MeshId(i as u32), binding: Binding::Bone(bones[0]), first_weight: 0 };
+    let instances = (0..meshes.len()).map(instance).collect();
+    let mut clips = vec![];
+    if targets > 0 {
+        let times = (0..=targets).map(|k| k as f64 / fps).collect();
+        let values =
+            (0..=targets).flat_map(|k| (0..targets).map(move |t| if t + 1 == k { 1.0 } else { 0.0 }));
+        let curve =
+            Curve::new(times, values.collect(), targets, Interpolation::Linear).expect("frames in order");
+        clips.push(Clip {
+            name: name.into(),
+            tracks: vec![Track { target: Target::Weights { first: 0 }, curve }],
+        });
+    }
+    Character::new(skeleton, meshes, instances, vec![0.0; targets], clips)
+        .expect("parts that were made for each other")
 }
 
 /// The name of a surface's material that is unique in its asset.

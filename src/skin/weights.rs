@@ -124,6 +124,23 @@ impl Weights {
         }
     }
 
+    /// The `k` largest influences of each vertex, scaled to sum 1.
+    ///
+    /// # Panics
+    /// If `k` is 0.
+    pub fn strongest(&self, k: usize) -> Self {
+        assert!(k > 0, "no influence is none");
+        let (mut out, old) =
+            (Self { per_vertex: k.min(self.per_vertex), ..Self::default() }, self.per_vertex);
+        for (bones, weights) in self.bones.chunks(old).zip(self.weights.chunks(old)) {
+            let (bones, weights) = (&bones[..out.per_vertex], &weights[..out.per_vertex]);
+            let sum: f64 = weights.iter().map(|w| *w as f64).sum();
+            out.bones.extend(bones);
+            out.weights.extend(weights.iter().map(|w| (*w as f64 / sum) as f32));
+        }
+        out
+    }
+
     /// Influences a vertex, `k`.
     pub fn per_vertex(&self) -> usize {
         self.per_vertex

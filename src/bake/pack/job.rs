@@ -43,7 +43,7 @@ impl Job {
             Target::Weights { .. } => Kind::Weights,
             _ => Kind::Vector,
         };
-        let samples = Samples::of(&track.curve, kind);
+        let samples = spread(Samples::of(&track.curve, kind), &track.curve, range);
         let x =
             samples.times.iter().map(|t| ((t - range.start) / range.duration().max(1e-300)).clamp(0.0, 1.0));
         let mut job = Self {
@@ -250,7 +250,8 @@ impl Job {
 
     /// Even pieces: as few as serve, and a few more, which may do with fewer bits each.
     fn even(&mut self, degree: Degree, allowed: f64, best: &mut Option<(Draft, usize)>) {
-        let most = 2 * self.samples.own.len() + 2;
+        // Two samples a piece, so that no piece is free to go where it likes.
+        let most = (self.samples.len() - 1) / 2;
         let mut few = None;
         let (mut n, mut failed) = (1, 0);
         while n <= most {
@@ -266,12 +267,12 @@ impl Job {
             let middle = (few + failed) / 2;
             if self.fitted(degree, middle).1 <= 0.85 * allowed { few = middle } else { failed = middle }
         }
-        let own = self.samples.own.len().saturating_sub(1).max(1);
+        let own = self.samples.own.len().saturating_sub(1).clamp(1, most);
         let mut tried = vec![few, few * 17 / 16, few * 9 / 8, few * 5 / 4, few * 3 / 2, own];
         tried.sort();
         tried.dedup();
         for n in tried {
-            if self.fitted(degree, n).1 > 0.97 * allowed {
+            if n > most || self.fitted(degree, n).1 > 0.97 * allowed {
                 continue;
             }
             let form = if degree == Degree::Linear { DraftForm::Even(n) } else { DraftForm::Cubic(n) };
@@ -328,6 +329,56 @@ impl Job {
         }
         worst
     }
+}
+
+/// The same samples, with more where keys are far apart or the clip goes on without them.
+fn spread(mut s: Samples, curve: &Curve, range: Range) -> Samples {
+    let step = range.duration() / (2 * s.own.len().max(2) - 2) as f64;
+    let jumps = (0..s.len()).any(|i| s.jumps(i));
+    if step <= 0.0 || jumps || curve.interpolation() == Interpolation::Hold {
+        return s;
+    }
+    let (from, w) = (std::mem::take(&mut s.times), s.width);
+    let old = std::mem::take(&mut s.values);
+    let own = std::mem::take(&mut s.own);
+    let put = |s: &mut Samples, t: f64, held: &[f32]| {
+        let mut v = held.to_vec();
+        if s.kind == Kind::Rotation {
+            let q = curve.sample_rotation(t);
+            let near = glam::Quat::from_slice(held).dot(q) >= 0.0;
+            v = if near { q } else { -q }.to_array().to_vec();
+        } else {
+            curve.sample(t, &mut v);
+        }
+        s.times.push(t);
+        s.values.extend(v);
+    };
+    let fill = |s: &mut Samples, a: f64, b: f64, held: &[f32]| {
+        let n = (0.9 * (b - a) / step).ceil() as usize;
+        (1..n).for_each(|k| put(s, a + (b - a) * k as f64 / n as f64, held));
+    };
+    let last = from.len() - 1;
+    if range.start < from[0] {
+        put(&mut s, range.start, &old[..w]);
+        fill(&mut s, range.start, from[0], &old[..w]);
+    }
+    for (i, &t) in from.iter().enumerate() {
+        let value = &old[i * w..(i + 1) * w];
+        if own.binary_search(&i).is_ok() {
+            s.own.push(s.times.len());
+        }
+        s.times.push(t);
+        s.values.extend(value);
+        if let Some(&next) = from.get(i + 1) {
+            fill(&mut s, t, next, value);
+        }
+    }
+    if range.end > from[last] {
+        let held = &old[last * w..];
+        fill(&mut s, from[last], range.end, held);
+        put(&mut s, range.end, held);
+    }
+    s
 }
 
 /// Radians between two rotations.

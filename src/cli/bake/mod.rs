@@ -1,6 +1,7 @@
 //! `sinew bake`: curves to curves within an error.
 
 mod clips;
+mod forms;
 mod report;
 mod values;
 mod write;
@@ -8,6 +9,7 @@ mod write;
 use super::batch::{Names, Outcome};
 use super::{Failure, load, print, say, say::Say};
 use clips::EditArgs;
+use forms::Forms;
 use report::Done;
 use serde_json::{Value, json};
 use sinew::bake::edit::EditError;
@@ -27,6 +29,10 @@ Examples:
   sinew bake walk.glb -o spot.glb --in-place --loop-blend 0.2s --mirror
   sinew bake wave.glb -o wave-add.glb --additive first --fps 30 --keep-keys
   sinew bake *.glb -o small/{name}.glb                  many files; one that fails does not stop the others
+  sinew bake fox.glb -o fox.sinew                       packed clips: play them with --motion fox.sinew
+  sinew bake fox.glb -o fox.stl --pose-at 0.5           as it stands, for printing and sculpting
+  sinew bake fox.glb -o fox.pc2 --vertices --clip Run   where each point is, frame by frame
+  sinew bake fox.glb -o light.glb --influences 2
   sinew bake fox.glb -o clips/{name}-{clip}.glb         each clip in a file of its own
 
 No vertex of the skin moves by more than the tolerance, at any time: at keys, at frames and between them, compared
@@ -40,7 +46,7 @@ pub struct Args {
     /// glTF files (.gltf, .glb).
     #[arg(required = true, value_name = "INPUT")]
     inputs: Vec<PathBuf>,
-    /// Where the result goes: .glb, or .gltf with a .bin beside it. {name} and {folder} are the input's, {clip} and {index} make a file a clip.
+    /// Where the result goes: .glb, .gltf with a .bin beside it, or .sinew for packed clips. {name} and {folder} are the input's, {clip} and {index} make a file a clip.
     #[arg(short, long, value_name = "FILE")]
     output: String,
     /// How far any vertex may be off: metres (0.001, 1m, 2cm, 0.5mm) or a part of the rest pose's diagonal (0.02%).
@@ -73,11 +79,13 @@ pub struct Args {
     json: bool,
     #[command(flatten)]
     edits: EditArgs,
+    #[command(flatten)]
+    forms: Forms,
 }
 
 pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     let mut names = Names::new(&args.output)?;
-    write::check_name(&names.example())?;
+    write::check_name(&names.example(), args.forms.endings())?;
     names.tell_apart(args.inputs.len())?;
     let many = args.inputs.len() > 1 || names.template.tells_clips();
     let (mut outcome, mut told) = (Outcome::default(), vec![]);
@@ -196,31 +204,41 @@ fn one(
         f.with_message(message)
     };
     let edited = clips::edited(&args.edits, import, &chosen, &desc, say).map_err(placed)?;
+    let clips: Vec<_> = edited.iter().map(|e| &e.clip).collect();
+    let limited = args.forms.limited(import, &clips, say);
+    let import = limited.as_ref().map_or(import, |l| &l.0);
+    if let Some(report) =
+        args.forms.write(args, [input, output], import, &edited, &desc, say).map_err(placed)?
+    {
+        outcome.done += 1;
+        told.push(report);
+        return Ok(());
+    }
     let bar = say.clip_progress(edited.len());
     let mut done = vec![];
     for e in &edited {
         let desc = BakeDesc { cycle: e.cycle, over: e.over.clone(), ..desc.clone() };
         let poses = AtomicUsize::new(0);
-        let watch = |_: Stage, n: usize| {
+        let watch = |stage: Stage, n: usize| {
             let all = poses.fetch_add(n, Ordering::Relaxed) + n;
-            bar.set_message(format!(
-                "{}, {}: {all} poses compared",
-                input.display(),
-                say::name(&e.clip.name)
-            ));
+            let doing = if stage == Stage::Check { "checking" } else { "searching" };
+            let clip = say::name(&e.clip.name);
+            bar.set_message(format!("{}, {clip}: {doing}, {all} poses compared", input.display()));
         };
         let baked = bake::bake_watched(&import.asset.character, &e.clip, &desc, &watch);
         done.push(Done { edited: e, baked: baked.map_err(failure).map_err(placed)? });
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let report = report::report(import, &done, args, desc.tolerance, diagonal);
+    let mut report = report::report(import, &done, args, desc.tolerance, diagonal);
+    if let Some((_, cost)) = &limited {
+        report["influences"] = cost.clone();
+    }
     write::write(args, input, output, import, &done, &report)?;
     outcome.done += 1;
     for d in done.iter().filter(|_| !args.json) {
         say.note(&report::line(import, d, diagonal));
     }
-    let mut report = report;
     (report["input"], report["output"]) = (json!(input), json!(output));
     told.push(report);
     if !args.json {

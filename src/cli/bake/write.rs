@@ -10,13 +10,15 @@ use sinew::io::{self, Import, gltf};
 use std::path::{Path, PathBuf};
 
 /// Say so before the work and not after it.
-pub(super) fn check_name(name: &str) -> Result<(), Failure> {
-    let known = Path::new(name)
-        .extension()
-        .is_some_and(|e| ["glb", "gltf"].iter().any(|k| e.eq_ignore_ascii_case(k)));
+pub(super) fn check_name(name: &str, endings: &[&str]) -> Result<(), Failure> {
+    let known =
+        Path::new(name).extension().is_some_and(|e| endings.iter().any(|k| e.eq_ignore_ascii_case(k)));
     match known {
         true => Ok(()),
-        false => Err(Failure::Usage(format!("-o {name}: expected a name that ends in .glb or .gltf"))),
+        false => {
+            let all = endings.join(", .");
+            Err(Failure::Usage(format!("-o {name}: expected a name that ends in one of .{all}")))
+        }
     }
 }
 
@@ -67,8 +69,8 @@ pub(super) fn write(
         .collect();
     let extras = Map::from_iter([("sinew".to_owned(), report.clone())]);
     let name = input.display().to_string();
-    let mut out =
-        gltf::with_clips(&bytes, Some(folder), &name, import, &clips, extras).map_err(|e| bad(&e))?;
+    let write = if args.forms.limits() { gltf::with_clips_and_influences } else { gltf::with_clips };
+    let mut out = write(&bytes, Some(folder), &name, import, &clips, extras).map_err(|e| bad(&e))?;
     for (i, d) in done.iter().enumerate() {
         if let Some(from) = args.edits.reference() {
             out.note(i, "additive", from.into());
@@ -89,6 +91,11 @@ pub(super) fn write(
     if folder.canonicalize().ok() != there.canonicalize().ok() {
         out.embed_pictures(Some(folder)).map_err(|e| bad(&e))?;
     }
+    put(args, output, &out)
+}
+
+/// One file, or two.
+pub(super) fn put(args: &Args, output: &Path, out: &gltf::Rewritten) -> Result<(), Failure> {
     let put = |path: &Path, bytes: &[u8]| {
         AtomicFile::write(path, bytes, args.force, Folder::MustExist).map_err(|e| Failure::Run(e.to_string()))
     };

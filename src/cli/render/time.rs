@@ -18,8 +18,8 @@ pub struct TimeArgs {
     /// The rest pose, untouched by any clip.
     #[arg(long, conflicts_with_all = ["clip", "poses"])]
     rest: bool,
-    /// Clips from this file instead of the input's.
-    #[arg(long, value_name = "FILE")]
+    /// Clips from this file instead of the input's: poses (.json) or packed clips (.sinew).
+    #[arg(long, value_name = "FILE", visible_alias = "motion")]
     pub poses: Option<PathBuf>,
     /// Draw this moment, in seconds.
     #[arg(long, value_name = "SECONDS", conflicts_with = "frames", allow_hyphen_values = true, value_parser = parse_seconds)]

@@ -16,6 +16,7 @@ mod draco;
 mod error;
 mod extensions;
 mod geometry;
+mod influences;
 mod material;
 mod mend;
 mod mounts;
@@ -28,10 +29,12 @@ mod textures;
 mod triangles;
 mod uri;
 mod warnings;
+mod wear;
 mod write;
 
 pub use error::GltfError;
-pub use rewrite::{NewClip, Rewritten, with_clips};
+pub use rewrite::{NewClip, Rewritten, with_clips, with_clips_and_influences};
+pub use wear::wear;
 pub use write::write;
 
 use super::{Import, Options};

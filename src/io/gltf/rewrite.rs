@@ -4,6 +4,7 @@ use super::carried;
 use super::container;
 use super::document::Document;
 use super::error::{Result, value};
+use super::influences;
 use super::mend;
 use super::uri::Source;
 use super::warnings::Warnings;
@@ -59,6 +60,33 @@ pub fn with_clips(
     clips: &[NewClip],
     extras: Map<String, Value>,
 ) -> Result<Rewritten> {
+    rewritten(bytes, base_dir, name, import, clips, extras, false)
+}
+
+/// [`with_clips`], and the influences of the import's vertices instead of the file's own.
+///
+/// # Errors
+/// As [`with_clips`], or if the vertices are not those of the file.
+pub fn with_clips_and_influences(
+    bytes: &[u8],
+    base_dir: Option<&Path>,
+    name: &str,
+    import: &Import,
+    clips: &[NewClip],
+    extras: Map<String, Value>,
+) -> Result<Rewritten> {
+    rewritten(bytes, base_dir, name, import, clips, extras, true)
+}
+
+fn rewritten(
+    bytes: &[u8],
+    base_dir: Option<&Path>,
+    name: &str,
+    import: &Import,
+    clips: &[NewClip],
+    extras: Map<String, Value>,
+    influenced: bool,
+) -> Result<Rewritten> {
     let parts = container::split(bytes, name)?;
     let mut w = Warnings::default();
     let doc = Document::new(mend::root(parts.json, &mut w)?, parts.bin, base_dir, &mut w)?;
@@ -67,8 +95,15 @@ pub fn with_clips(
     let old = json.remove("animations").unwrap_or_default();
     // Channels that nobody here can play keep their keys.
     json.insert("animations".into(), carried::kept(&old, clips).into());
-    drop_accessors(&mut json, &old);
+    let mut unused = sampled(&old);
+    if influenced {
+        unused.extend(influences::strip(&mut json));
+    }
+    drop_accessors(&mut json, &unused);
     let mut out = Rewritten { bin: repack(&mut json, &doc), json };
+    if influenced {
+        influences::write(&mut out, import)?;
+    }
     out.animate(&Places::of(import), clips, &old)?;
     out.json.entry("asset").or_insert(json!({"version": "2.0"}));
     let asset =
@@ -390,7 +425,7 @@ fn increasing(times: &[f64]) -> Vec<f32> {
 }
 
 /// The primitives of all meshes.
-fn primitives(json: &mut Map<String, Value>) -> impl Iterator<Item = &mut Value> {
+pub(super) fn primitives(json: &mut Map<String, Value>) -> impl Iterator<Item = &mut Value> {
     let meshes = json.get_mut("meshes").and_then(Value::as_array_mut).into_iter().flatten();
     meshes.filter_map(|m| m.get_mut("primitives")?.as_array_mut()).flatten()
 }
@@ -413,21 +448,22 @@ fn accessor_places(json: &mut Map<String, Value>, visit: &mut impl FnMut(&mut Va
     }
 }
 
+/// Accessors of the keys of animations.
+fn sampled(animations: &Value) -> Vec<u64> {
+    let samplers =
+        animations.as_array().into_iter().flatten().filter_map(|a| a["samplers"].as_array()).flatten();
+    samplers.flat_map(|s| ["input", "output"].map(|end| s[end].as_u64())).flatten().collect()
+}
+
 /// Take out accessors that only animations used, and the views that only those used.
-fn drop_accessors(json: &mut Map<String, Value>, animations: &Value) {
+fn drop_accessors(json: &mut Map<String, Value>, unused: &[u64]) {
     let known = |e: &Value| HARMLESS.iter().any(|h| e.as_str().is_some_and(|e| e.starts_with(h)));
     let places_known = list(json, "extensionsUsed").iter().all(known);
     let count = list(json, "accessors").len();
     let mut gone = vec![false; count];
     if places_known {
-        for s in
-            animations.as_array().into_iter().flatten().filter_map(|a| a["samplers"].as_array()).flatten()
-        {
-            for end in ["input", "output"] {
-                if let Some(g) = s[end].as_u64().and_then(|i| gone.get_mut(i as usize)) {
-                    *g = true;
-                }
-            }
+        for &i in unused {
+            gone.get_mut(i as usize).into_iter().for_each(|g| *g = true);
         }
     }
     accessor_places(json, &mut |v| {

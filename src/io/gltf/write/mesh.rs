@@ -117,7 +117,7 @@ fn indices(out: &mut Rewritten, mesh: &Mesh) -> usize {
 }
 
 /// Sets of four bones and weights.
-fn influences(out: &mut Rewritten, weights: &Weights, attributes: &mut Value) {
+pub(in crate::io::gltf) fn influences(out: &mut Rewritten, weights: &Weights, attributes: &mut Value) {
     let rows: Vec<Vec<(usize, f32)>> = (0..weights.vertex_count()).map(|v| row(weights, v)).collect();
     let most = rows.iter().map(Vec::len).max().unwrap_or(0);
     let wide = rows.iter().flatten().any(|w| w.0 > 255);

@@ -15,6 +15,7 @@ use crate::io::Warning;
 use crate::skeleton::{BoneId, Skeleton};
 use glam::{Affine3A, Quat, Vec3};
 use mesh::Meshes;
+pub(super) use mesh::influences;
 use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,0 +1,257 @@
+//! Other forms than curves in glTF: packed clips, stills, moving points; and fewer influences.
+
+use super::clips::Edited;
+use super::report::{self, Done};
+use super::{Args, failure, write};
+use crate::cli::{Failure, say::Say};
+use serde_json::{Map, Value, json};
+use sinew::asset::Asset;
+use sinew::bake::{self, BakeDesc, Baked, influences};
+use sinew::clip::Clip;
+use sinew::io::picture::{AtomicFile, Folder};
+use sinew::io::still::{self, Stance, Still};
+use sinew::io::{self, Import, gltf, obj, pc2, ply, sinew_clip, stl};
+use sinew::pose::Pose;
+use sinew::time::frame_count;
+use std::path::Path;
+
+/// The most frames of a form without bones.
+const MOST_FRAMES: usize = 100_000;
+
+/// The most frames that are morph targets: their weights are a square of numbers.
+const MOST_TARGETS: usize = 2000;
+
+#[derive(clap::Args)]
+pub(super) struct Forms {
+    /// Write the character as it stands at this time: .glb, .gltf, .obj, .ply or .stl, in metres, closed where it was closed.
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, conflicts_with = "vertices")]
+    pose_at: Option<f64>,
+    /// Write a clip for programs without skins, --vertices-fps frames a second: a morph target a frame (.glb, .gltf), or a point cache
+    /// (.pc2) and the mesh that it moves (.obj).
+    #[arg(long)]
+    vertices: bool,
+    /// Frames a second of --vertices.
+    #[arg(long, value_name = "FPS", default_value_t = 30.0, value_parser = rate, requires = "vertices")]
+    vertices_fps: f64,
+    /// Keep this many influences a vertex, the largest, and say what that costs on these clips.
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..=64))]
+    influences: Option<u16>,
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    let fps = text.parse::<f64>().ok().filter(|f| (0.1..=1000.0).contains(f));
+    fps.ok_or_else(|| "expected frames a second, 0.1 to 1000".into())
+}
+
+/// What the name of the output asks for.
+fn ending(output: &Path) -> String {
+    output.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
+}
+
+impl Forms {
+    /// Endings of outputs.
+    pub fn endings(&self) -> &'static [&'static str] {
+        match (self.pose_at, self.vertices) {
+            (Some(_), _) => &["glb", "gltf", "obj", "ply", "stl"],
+            (None, true) => &["glb", "gltf", "pc2"],
+            (None, false) => &["glb", "gltf", "sinew"],
+        }
+    }
+
+    /// Write what is no curves in glTF, and tell what was written; none if that is not what is wanted.
+    pub fn write(
+        &self,
+        args: &Args,
+        paths: [&Path; 2],
+        import: &Import,
+        edited: &[Edited],
+        desc: &BakeDesc,
+        say: &Say,
+    ) -> Result<Option<Value>, Failure> {
+        let clips: Vec<&Clip> = edited.iter().map(|e| &e.clip).collect();
+        let mut told = if let Some(t) = self.pose_at {
+            self.pose(args, paths, import, &clips, t)?
+        } else if self.vertices {
+            self.points(args, paths, import, &clips, say)?
+        } else if ending(paths[1]) == "sinew" {
+            packed(args, paths[1], import, edited, desc, say)?
+        } else {
+            return Ok(None);
+        };
+        (told["input"], told["output"]) = (json!(paths[0]), json!(paths[1]));
+        if !args.json {
+            say.note(&format!("wrote {}", paths[1].display()));
+        }
+        Ok(Some(told))
+    }
+
+    fn pose(
+        &self,
+        args: &Args,
+        [input, output]: [&Path; 2],
+        import: &Import,
+        clips: &[&Clip],
+        t: f64,
+    ) -> Result<Value, Failure> {
+        let c = &import.asset.character;
+        let mut pose = c.rest_pose();
+        clips.iter().take(1).for_each(|clip| clip.sample(c.skeleton(), t, &mut pose));
+        let stance = Stance::new(c, &groups(import));
+        let asset = &import.asset;
+        let told = json!({"pose_at": t, "clip": clips.first().map(|c| &c.name)});
+        match ending(output).as_str() {
+            "obj" => with_materials(args, output, &stance.at(&pose), asset),
+            "ply" => put(args, output, &ply::write(&stance.at(&pose))),
+            "stl" => put(args, output, &stl::write(&stance.at(&pose))),
+            _ => frozen(args, [input, output], import, &[pose], 1.0, "pose", &told),
+        }?;
+        Ok(told)
+    }
+
+    fn points(
+        &self,
+        args: &Args,
+        [input, output]: [&Path; 2],
+        import: &Import,
+        clips: &[&Clip],
+        say: &Say,
+    ) -> Result<Value, Failure> {
+        let [clip] = clips else {
+            return Err(Failure::Usage("--vertices: expected one clip; choose it with --clip".into()));
+        };
+        let cache = ending(output) == "pc2";
+        let range = clip.playback();
+        let limit = if cache { MOST_FRAMES } else { MOST_TARGETS };
+        let intervals = frame_count(range, self.vertices_fps, limit);
+        let intervals = intervals.map_err(|e| Failure::Usage(format!("--vertices: {e}")))?;
+        let c = &import.asset.character;
+        let pose = |t: f64| {
+            let mut pose = c.rest_pose();
+            clip.sample(c.skeleton(), t.min(range.end), &mut pose);
+            pose
+        };
+        let time = |k: f64| range.start + k / self.vertices_fps;
+        let stance = Stance::new(c, &groups(import));
+        let off = (0..intervals).map(|k| {
+            let at = |u: f64| stance.points(&pose(time(k as f64 + u)));
+            let [a, b, m] = [at(0.0), at(1.0), at(0.5)];
+            m.iter().zip(a.iter().zip(&b)).map(|(m, (a, b))| m.distance(0.5 * (*a + *b))).fold(0.0, f64::max)
+        });
+        let off = off.fold(0.0, f64::max);
+        // A parabola through the middle is farthest off there.
+        let told = json!({"fps": self.vertices_fps, "frames": intervals + 1, "between_frames": off});
+        if cache {
+            let still = stance.at(&pose(time(0.0)));
+            let mut bytes = pc2::head(still.points.len() as u32, intervals as u32 + 1);
+            for k in 0..=intervals {
+                let points: Vec<_> =
+                    stance.points(&pose(time(k as f64))).iter().map(|p| p.as_vec3()).collect();
+                bytes.extend(pc2::sample(&points));
+            }
+            with_materials(args, &output.with_extension("obj"), &still, &import.asset)?;
+            put(args, output, &bytes)?;
+        } else {
+            let poses: Vec<Pose> = (0..=intervals).map(|k| pose(time(k as f64))).collect();
+            frozen(args, [input, output], import, &poses, self.vertices_fps, &clip.name, &told)?;
+        }
+        say.note(&format!(
+            "{} frames; exact at each, and up to {:.4} mm off in the middle between two",
+            intervals + 1,
+            1e3 * off
+        ));
+        Ok(told)
+    }
+
+    /// The import with fewer influences, and what that costs.
+    pub fn limited(&self, import: &Import, clips: &[&Clip], say: &Say) -> Option<(Import, Value)> {
+        let k = self.influences?;
+        let c = &import.asset.character;
+        let less = c.with_influences(k.into());
+        let cost = influences::cost(c, &less, clips);
+        say.note(&format!(
+            "at most {k} influences: {} vertices lose up to {:.1}% of their weight and stray by up to {:.4} mm (by their weights, no more than {:.4} mm)",
+            cost.vertices,
+            100.0 * cost.dropped,
+            1e3 * cost.worst.distance,
+            1e3 * cost.bound
+        ));
+        let told = json!({
+            "kept": k, "vertices": cost.vertices, "dropped": cost.dropped, "bound": cost.bound,
+            "measured": cost.worst.distance, "time": cost.worst.time, "moments": cost.moments,
+        });
+        let mut limited = import.clone();
+        limited.asset.character = less;
+        Some((limited, told))
+    }
+
+    /// Whether the file's own influences no longer serve.
+    pub fn limits(&self) -> bool {
+        self.influences.is_some()
+    }
+}
+
+/// Instances of one node are one body.
+fn groups(import: &Import) -> Vec<u32> {
+    import.primitives.iter().map(|p| p.node).collect()
+}
+
+fn put(args: &Args, path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    AtomicFile::write(path, bytes, args.force, Folder::MustExist).map_err(|e| Failure::Run(e.to_string()))
+}
+
+fn with_materials(args: &Args, path: &Path, still: &Still, asset: &Asset) -> Result<(), Failure> {
+    let library = path.with_extension("mtl");
+    let name = library.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    put(args, &library, obj::materials(asset).as_bytes())?;
+    put(args, path, obj::write(still, asset, Some(&name)).as_bytes())
+}
+
+/// A glTF file of poses, with the look of the input.
+fn frozen(
+    args: &Args,
+    [input, output]: [&Path; 2],
+    import: &Import,
+    poses: &[Pose],
+    fps: f64,
+    name: &str,
+    told: &Value,
+) -> Result<(), Failure> {
+    let bad = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", input.display()));
+    let character = still::frozen(&import.asset.character, poses, fps, name);
+    let clips: Vec<gltf::NewClip> =
+        character.clips().iter().map(|clip| gltf::NewClip { clip, short: &[], replaces: None }).collect();
+    let asset =
+        Asset { character: character.clone(), materials: import.asset.materials.clone(), ..Asset::default() };
+    let extras = Map::from_iter([("sinew".to_owned(), told.clone())]);
+    let (mut out, _) = gltf::write(&asset, &[], &clips, extras).map_err(|e| bad(&e))?;
+    if import.format == "glTF" {
+        let bytes = io::read_file(input).map_err(|e| bad(&e))?;
+        let folder = input.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        gltf::wear(&mut out, &bytes, Some(folder), &input.display().to_string()).map_err(|e| bad(&e))?;
+        out.embed_pictures(Some(folder)).map_err(|e| bad(&e))?;
+    }
+    write::put(args, output, &out)
+}
+
+/// Packed clips in a file of their own.
+fn packed(
+    args: &Args,
+    output: &Path,
+    import: &Import,
+    edited: &[Edited],
+    desc: &BakeDesc,
+    say: &Say,
+) -> Result<Value, Failure> {
+    let c = &import.asset.character;
+    let (mut packed, mut done) = (vec![], vec![]);
+    for e in edited {
+        let one = bake::pack(c, &e.clip, desc).map_err(failure)?;
+        done.push(Done { edited: e, baked: Baked { report: one.report, ..Baked::default() } });
+        packed.push((e.clip.name.as_str(), one.packed));
+    }
+    let all: Vec<_> = packed.iter().map(|(name, p)| (*name, p)).collect();
+    put(args, output, &sinew_clip::write(c, &all))?;
+    let diagonal = bake::Gauge::new(c, 1).diagonal();
+    done.iter().filter(|_| !args.json).for_each(|d| say.note(&report::line(import, d, diagonal)));
+    Ok(report::report(import, &done, args, desc.tolerance, diagonal))
+}
