@@ -91,9 +91,8 @@ enum Answer {
 fn path_line(ui: &mut egui::Ui, path: &mut String) -> Answer {
     let mut answer = Answer::Nothing;
     ui.horizontal(|ui| {
-        let edit = ui.add(TextEdit::singleline(path).desired_width(420.0).hint_text("path"));
         let named = ui.label("Path").id;
-        let edit = edit.labelled_by(named);
+        let edit = ui.add(TextEdit::singleline(path).desired_width(420.0)).labelled_by(named);
         if edit.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) {
             answer = Answer::Do;
         }
@@ -253,7 +252,7 @@ impl Jobs {
         }
         let Some(ask) = &mut self.ask else { return };
         let shown = Window::new(ask.title())
-            .id(egui::Id::unique("ask"))
+            .id(egui::Id::unique(("ask", ask.title())))
             .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
             .collapsible(false)
             .resizable(false)
