@@ -16,6 +16,8 @@ mod deform;
 #[cfg(feature = "cli")]
 mod edits;
 #[cfg(feature = "io")]
+mod forms;
+#[cfg(feature = "io")]
 mod gltf;
 #[cfg(feature = "cli")]
 mod golden;

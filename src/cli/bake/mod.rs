@@ -42,9 +42,9 @@ Examples:
   sinew bake fox.glb -o light.glb --influences 2
   sinew bake fox.glb -o clips/{name}-{clip}.glb         each clip in a file of its own
 
-No vertex of the skin moves by more than the tolerance, at any time: at keys, at frames and between them, compared
-240 times a second or more, with an estimate of what hides between. What was reached is printed
-and written into asset.extras.sinew. From glTF to glTF everything but the animations is carried through untouched. Where the bound cannot be kept, nothing is
+No vertex of the skin moves by more than the tolerance, at any time: vertices are compared at all keys, and between
+them until the second derivatives of the bones' motion leave no room for more. What was reached is printed and
+written into asset.extras.sinew. From glTF to glTF everything but the animations is carried through untouched. Where the bound cannot be kept, nothing is
 written and the exit code is 4.";
 
 #[derive(clap::Args)]
