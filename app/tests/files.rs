@@ -15,10 +15,10 @@ use sinew_app::state::{Change, Command, Edit, State};
 use std::path::{Path, PathBuf};
 
 /// An empty folder, gone when the test is over.
-struct Folder(PathBuf);
+pub struct Folder(pub PathBuf);
 
 impl Folder {
-    fn new(name: &str) -> Self {
+    pub fn new(name: &str) -> Self {
         let path = std::env::temp_dir().join(format!("sinew-app-{}-{name}", std::process::id()));
         let _ = std::fs::remove_dir_all(&path);
         std::fs::create_dir_all(&path).expect("a folder for tests");
@@ -33,7 +33,7 @@ impl Drop for Folder {
 }
 
 /// Frames until the job is done.
-fn wait(p: &mut Person) {
+pub fn wait(p: &mut Person) {
     for _ in 0..6000 {
         p.ui.step();
         if !p.ui.state().jobs.busy() {

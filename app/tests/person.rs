@@ -8,7 +8,7 @@ use sinew::image::Rgba8;
 use sinew::io::picture::{PngLevel, encode_png};
 use sinew_app::App;
 use sinew_app::paint::Paint;
-use sinew_app::state::State;
+use sinew_app::state::{Quality, State, View};
 use std::sync::{Arc, Mutex};
 
 pub const CTRL: Modifiers = Modifiers::COMMAND;
@@ -37,7 +37,10 @@ impl Person {
             .with_max_steps(64)
             .with_context_setup(sinew_app::set_up)
             .renderer(Textures(paint.clone()));
-        let app = App::new(state);
+        // The picture of the character is not what is looked at here.
+        let view = View { quality: Quality::Draft, ..state.view.clone() };
+        let mut app = App::new(state);
+        app.state.view = view;
         let mut ui = build.build_ui_state(|ui, app: &mut App| app.ui(ui), app);
         ui.run();
         Self { ui, paint }

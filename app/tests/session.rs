@@ -1,9 +1,15 @@
 //! A real session without a window: pointers, keys and names, as a person would.
 
+use super::files::{Folder, wait};
 use super::person::{CTRL, CTRL_SHIFT, Person};
 use super::pip;
 use egui::{Event, Key, Modifiers, PointerButton, pos2};
 use sinew::clip::Interpolation;
+use sinew::frames::View;
+use sinew::io::picture::frames_of;
+use sinew::render::Renderer;
+use sinew_app::jobs::film::Wish;
+use sinew_app::jobs::open;
 use sinew_app::state::State;
 
 #[test]
@@ -90,6 +96,34 @@ fn from_the_first_bone_to_the_last_frame() {
         p.key(CTRL_SHIFT, Key::Z);
     }
     assert!(p.state().document.same_bits(&end));
+
+    // Onto the disk and back, equal.
+    let folder = Folder::new("session");
+    let [rig, glb, gif] = ["pip.json", "pip.glb", "pip.gif"].map(|n| folder.0.join(n));
+    let ctx = p.ui.ctx.clone();
+    let app = p.ui.state_mut();
+    app.jobs.save(&ctx, rig.clone(), &app.state);
+    wait(&mut p);
+    assert!(!p.state().unsaved());
+    let again = open::read(&rig).expect("what was written").state();
+    assert_eq!(again.document.to_clips(), p.state().document.to_clips());
+
+    // And out, to whoever plays it.
+    let (clip, range) = (p.state().clip, p.state().active().range);
+    let app = p.ui.state_mut();
+    app.jobs.export_gltf(&ctx, glb.clone(), &app.state);
+    wait(&mut p);
+    let (view, renderer, rate) = (View::default(), Renderer::Raster, "6".parse().expect("a rate"));
+    let wish =
+        Wish { to: gif.clone(), sheet: false, size: [48, 40], view, renderer, rate, clip, at: 0.0, range };
+    let app = p.ui.state_mut();
+    app.jobs.export_film(&ctx, wish, &app.state);
+    wait(&mut p);
+    let import = sinew::io::import(&glb, &sinew::io::Options::default()).expect("a GLB");
+    let played = import.asset.character.clips()[clip].range();
+    assert!((played.end - 2.0).abs() < 1e-6, "{played:?}");
+    let frames = frames_of(&std::fs::read(&gif).expect("a film")).expect("a GIF").count();
+    assert_eq!(frames, 12);
 }
 
 #[test]
