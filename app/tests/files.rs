@@ -113,17 +113,24 @@ fn exports_hold_what_was_edited() {
         at: 0.0,
         range: clips[0].playback(),
     };
-    for (name, sheet) in [("pip.gif", false), ("pip.##.png", false), ("pip.png", true)] {
+    let rays = Renderer::Ray(Default::default());
+    let (film, still) = (Renderer::Raster, rays);
+    for (name, sheet, renderer) in [
+        ("pip.gif", false, film),
+        ("pip.##.png", false, film),
+        ("pip.png", true, film),
+        ("still.png", false, still),
+    ] {
         let ctx = p.ui.ctx.clone();
         let app = p.ui.state_mut();
-        app.jobs.export_film(&ctx, wish(name, sheet), &app.state);
+        app.jobs.export_film(&ctx, Wish { renderer, ..wish(name, sheet) }, &app.state);
         wait(&mut p);
     }
     let bytes = std::fs::read(folder.0.join("pip.gif")).expect("a film");
     let frames = frames_of(&bytes).expect("a GIF").count();
     let stills = (1..100).take_while(|i| folder.0.join(format!("pip.{i:02}.png")).exists()).count();
     assert!(frames >= 4 && stills == frames, "{frames} {stills}");
-    assert!(folder.0.join("pip.png").exists());
+    assert!(folder.0.join("pip.png").exists() && folder.0.join("still.png").exists());
     let table = std::fs::read_to_string(folder.0.join("pip.json")).expect("a table");
     assert_eq!(table.matches("\"rotated\"").count(), frames);
 }

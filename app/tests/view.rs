@@ -116,13 +116,14 @@ fn overlays_are_drawn_and_nothing_is_drawn_twice() {
     assert_eq!(p.ui.state().viewport.pictures(), drawn, "nothing changed, nothing is drawn");
     p.shot("pyramids");
     let mut last = p.picture();
-    let changes: [(&str, &dyn Fn(&mut View)); 6] = [
-        ("sticks", &|v| v.bones = BoneStyle::Sticks),
-        ("xray", &|v| v.bones = BoneStyle::XRay),
-        ("hidden", &|v| v.bones = BoneStyle::Hidden),
-        ("paths", &|v| v.paths = true),
-        ("onion", &|v| v.onion = true),
-        ("draft", &|v| v.quality = Quality::Draft),
+    type Change = (&'static str, fn(&mut View));
+    let changes: [Change; 6] = [
+        ("sticks", |v| v.bones = BoneStyle::Sticks),
+        ("xray", |v| v.bones = BoneStyle::XRay),
+        ("hidden", |v| v.bones = BoneStyle::Hidden),
+        ("paths", |v| v.paths = true),
+        ("onion", |v| v.onion = true),
+        ("draft", |v| v.quality = Quality::Draft),
     ];
     for (name, change) in changes {
         p.ui.state_mut().state.update(Command::SetTime(0.4)).expect("always");

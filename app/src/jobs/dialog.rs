@@ -163,8 +163,9 @@ impl Ask {
                 });
                 answer
             }
-            Self::Recover(_) => {
-                ui.label("An editor ended without saving. Its work is still there.");
+            Self::Recover(kept) => {
+                let file = recover::file_of(kept).map_or("a file".into(), |f| f.display().to_string());
+                ui.label(format!("An editor ended without saving. Its work on {file} is still there."));
                 let mut answer = Answer::Nothing;
                 ui.horizontal(|ui| {
                     for (name, then) in

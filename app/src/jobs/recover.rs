@@ -33,11 +33,19 @@ pub fn left(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.path());
     let gone = |p: &PathBuf| {
         let id = p.file_stem().and_then(|s| s.to_str()).and_then(|s| s.parse::<u32>().ok());
-        id.is_some_and(|id| id != std::process::id() && !Path::new(&format!("/proc/{id}")).exists())
+        id.is_some_and(|id| !runs(id))
     };
     let mut all: Vec<PathBuf> = entries.filter(gone).collect();
     all.sort();
     all
+}
+
+/// Whether a process is an editor, and not dead with nobody to bury it.
+fn runs(id: u32) -> bool {
+    let name = |id: &str| std::fs::read_to_string(format!("/proc/{id}/comm")).ok();
+    let state = std::fs::read_to_string(format!("/proc/{id}/stat")).unwrap_or_default();
+    let dead = state.rsplit_once(") ").is_none_or(|(_, s)| s.starts_with(['Z', 'X']));
+    id == std::process::id() || (!dead && name("self") == name(&id.to_string()))
 }
 
 /// Put clips aside.
@@ -52,6 +60,12 @@ pub fn keep(folder: &Path, file: &Path, document: &Document) -> Result<(), Strin
     let kept = Kept { sinew_recovery: 1, file, rate, poses };
     let text = serde_json::to_vec(&kept).map_err(|e| e.to_string())?;
     put(&own(folder), &text)
+}
+
+/// The file that a kept one belongs to, if it can be read.
+pub fn file_of(path: &Path) -> Option<PathBuf> {
+    let kept: Kept = serde_json::from_slice(&sinew::io::read_file(path).ok()?).ok()?;
+    Some(kept.file)
 }
 
 /// The document that was being edited; it counts as unsaved.

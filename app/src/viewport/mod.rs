@@ -65,7 +65,8 @@ impl Default for Viewport {
 enum Drag {
     Hold(Box<Hold>, Part),
     Turn,
-    Pan,
+    /// It was cancelled, and the button is still held.
+    Over,
 }
 
 /// Points around a handle that count as on it.
@@ -154,7 +155,7 @@ impl Viewport {
         let by = |b| response.dragged_by(b);
         let delta = [response.drag_delta().x, response.drag_delta().y];
         let pan = (by(PointerButton::Middle) && shift) || by(PointerButton::Secondary);
-        if pan || matches!(self.drag, Some(Drag::Pan)) {
+        if pan {
             self.orbit.pan(delta, rect.height());
         } else if by(PointerButton::Middle) || matches!(self.drag, Some(Drag::Turn)) {
             self.orbit.turn(delta);
@@ -171,18 +172,18 @@ impl Viewport {
             self.drag = from.map(|p| self.take(state, &lens, p, modifiers, bus));
         } else if matches!(self.drag, Some(Drag::Hold(..))) && !state.in_gesture() {
             // Somebody cancelled it.
-            self.drag = Some(Drag::Pan);
+            self.drag = Some(Drag::Over);
         }
-        if let (Some(Drag::Hold(hold, _)), Some(p)) = (&mut self.drag, pointer) {
-            if response.dragged_by(PointerButton::Primary) {
-                let changes = hold.change(state, &lens, [p.x, p.y], modifiers.command);
-                bus.send(Command::Preview(Edit::Pose(changes)));
-            }
+        if let (Some(Drag::Hold(hold, _)), Some(p)) = (&mut self.drag, pointer)
+            && response.dragged_by(PointerButton::Primary)
+        {
+            let changes = hold.change(state, &lens, [p.x, p.y], modifiers.command);
+            bus.send(Command::Preview(Edit::Pose(changes)));
         }
-        if response.drag_stopped_by(PointerButton::Primary) {
-            if let Some(Drag::Hold(..)) = self.drag.take() {
-                bus.send(Command::Commit);
-            }
+        if response.drag_stopped_by(PointerButton::Primary)
+            && let Some(Drag::Hold(..)) = self.drag.take()
+        {
+            bus.send(Command::Commit);
         }
         if let (true, Some(p)) = (response.clicked(), response.interact_pointer_pos()) {
             let on_handle = self.gizmo(state, &lens).and_then(|g| g.hit(&lens, [p.x, p.y], REACH));

@@ -145,8 +145,11 @@ impl Picture {
             }
             take(live, &|| state.pose_at(t), &mut cost);
             paint(live, &mut cost, buffer);
-            let [r, g, b] = if *k < 0 { [90, 140, 255] } else { [255, 160, 60] };
-            let tint = Color32::from_rgba_unmultiplied(r, g, b, *share);
+            let color = if *k < 0 { [70, 120, 255] } else { [255, 140, 40] };
+            for p in buffer.data.chunks_exact_mut(4) {
+                (0..3).for_each(|c| p[c] = ((u16::from(p[c]) + 3 * color[c]) / 4) as u8);
+            }
+            let tint = Color32::from_white_alpha(*share);
             let mut slot = ghosts.get(used).map(|g| g.0.clone());
             upload(ctx, "ghost", buffer, &mut slot);
             ghosts.truncate(used);
