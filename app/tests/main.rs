@@ -1,7 +1,11 @@
 //! Promises of the editor, one binary.
 
+mod files;
+mod keys;
+mod person;
 mod random;
 mod session;
+mod view;
 
 use sinew::asset::Asset;
 use std::path::PathBuf;

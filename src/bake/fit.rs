@@ -1,7 +1,7 @@
 //! One track: the fewest keys that keep every sample of it within a tolerance.
 
 use crate::clip::{Curve, Interpolation};
-use crate::math::rotation;
+use crate::math::{euler, rotation};
 use glam::{DVec3, Quat, Vec3};
 
 /// How values of a track are compared, and what of them is stored.
@@ -9,6 +9,8 @@ use glam::{DVec3, Quat, Vec3};
 pub(super) enum Kind {
     /// Unit quaternions: radians between them.
     Rotation,
+    /// XZX angles: radians that the bone turns by.
+    Angles,
     /// Vectors: their distance.
     Vector,
     /// Morph weights: the largest difference.
@@ -124,6 +126,7 @@ impl Samples {
     pub fn distance(&self, a: &[f32], b: &[f32]) -> f64 {
         match self.kind {
             Kind::Rotation => rotation::angle_between(Quat::from_slice(a), Quat::from_slice(b)) as f64,
+            Kind::Angles => angles_apart(wide(a), wide(b)),
             Kind::Vector => wide(a).distance(wide(b)),
             Kind::Weights => a.iter().zip(b).map(|(a, b)| (a - b).abs() as f64).fold(0.0, f64::max),
         }
@@ -142,6 +145,11 @@ impl Samples {
 
 fn wide(v: &[f32]) -> DVec3 {
     Vec3::from_slice(v).as_dvec3()
+}
+
+/// Radians between triples that are near each other. Turns count, so one that is a turn off is not near.
+fn angles_apart(a: DVec3, b: DVec3) -> f64 {
+    euler::xzx_distance(a.to_array(), b.to_array())
 }
 
 /// Keys of straight pieces: of samples, with the values that are stored for them.
@@ -329,6 +337,7 @@ fn off(kind: Kind, a: &[f32], b: &[f32], u: f32, value: &[f32]) -> f64 {
             let q = rotation::slerp(Quat::from_slice(a), Quat::from_slice(b), u);
             rotation::angle_between(q, Quat::from_slice(value)) as f64
         }
+        Kind::Angles => angles_apart(wide(a).lerp(wide(b), u as f64), wide(value)),
         Kind::Vector => wide(a).lerp(wide(b), u as f64).distance(wide(value)),
         Kind::Weights => {
             let each = a.iter().zip(b).zip(value).map(|((a, b), v)| (a + (b - a) * u - v).abs() as f64);

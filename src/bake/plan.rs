@@ -65,7 +65,7 @@ impl<'a> Plan<'a> {
                     rest.locals[b.index()].translation.to_array().to_vec(),
                 ),
                 Target::Scale(b) => (Kind::Vector, at(b), rest.locals[b.index()].scale.to_array().to_vec()),
-                Target::Xzx(b) => (Kind::Vector, at(b), vec![0.0; 3]),
+                Target::Xzx(b) => (Kind::Angles, at(b), vec![0.0; 3]),
                 Target::Weights { first } => {
                     let run = first..first + track.curve.width();
                     let reach = targets[run.clone()].iter().sum::<f64>().max(1e-9);

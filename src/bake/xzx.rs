@@ -1,13 +1,12 @@
 //! Quaternion keys into XZX angles and back, within an error on the skin.
 //!
 //! Between two keys angles run straight and quaternions on an arc: different paths with the same ends. Each piece of the source is
-//! tried from its start, and halved where the new path leaves it; what comes of that goes through [`bake`](super::bake).
+//! tried from its start, and halved where the new path leaves it; of the keys that come of that [`bake`](super::bake) chooses.
 //! Of all triples of a rotation the one nearest to the key before is taken, over all three angles and both solutions
 //! ([`euler::nearest_xzx`]): each angle unwrapped on its own would turn a bone over where it passes its rest.
 
 use super::gauge::Gauge;
-use super::times::{self, Verdict};
-use super::{BakeDesc, BakeError, Baked, Report, bake, check, plan};
+use super::{BakeDesc, BakeError, Baked, SEAM, Watch, bake_from, check, edit, plan, start, times};
 use crate::character::Character;
 use crate::clip::{Clip, Curve, Interpolation, Target, Track};
 use crate::math::{euler, rotation};
@@ -16,9 +15,11 @@ use glam::{DQuat, Quat, Vec3};
 use std::f64::consts::TAU;
 
 /// How rotations are written.
-#[derive(Clone, Copy, PartialEq)]
-enum Form {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// XZX angles about aim frames.
     Angles,
+    /// Quaternions against the parent.
     Quaternions,
 }
 
@@ -60,12 +61,12 @@ const LOOKS: usize = 8;
 /// ```
 ///
 /// # Errors
-/// [`BakeError`] as for [`bake`].
+/// [`BakeError`] as for [`bake`](super::bake).
 ///
 /// # Panics
 /// If the clip is not of the character.
 pub fn to_xzx(character: &Character, clip: &Clip, desc: &BakeDesc) -> Result<Baked, BakeError> {
-    convert(character, clip, desc, Form::Angles)
+    convert(character, clip, desc, Form::Angles, &|_, _| {})
 }
 
 /// The clip with quaternions in place of XZX angles, as other programs read it: what [`to_xzx`] undoes.
@@ -73,62 +74,82 @@ pub fn to_xzx(character: &Character, clip: &Clip, desc: &BakeDesc) -> Result<Bak
 /// Arcs are short: an angle that turns on and on gets a key every third of a turn or more. Cubics by a rule become cubics with slopes.
 ///
 /// # Errors
-/// [`BakeError`] as for [`bake`].
+/// [`BakeError`] as for [`bake`](super::bake).
 ///
 /// # Panics
 /// If the clip is not of the character.
 pub fn to_quat(character: &Character, clip: &Clip, desc: &BakeDesc) -> Result<Baked, BakeError> {
-    convert(character, clip, desc, Form::Quaternions)
+    convert(character, clip, desc, Form::Quaternions, &|_, _| {})
 }
 
-fn convert(character: &Character, clip: &Clip, desc: &BakeDesc, form: Form) -> Result<Baked, BakeError> {
+/// Either of them, and tell how many poses were compared as it goes.
+///
+/// # Errors
+/// [`BakeError`] as for [`bake`](super::bake).
+///
+/// # Panics
+/// If the clip is not of the character.
+pub fn convert(
+    character: &Character,
+    clip: &Clip,
+    desc: &BakeDesc,
+    form: Form,
+    watch: Watch,
+) -> Result<Baked, BakeError> {
     check(character, clip, desc)?;
-    let gauge = Gauge::of(character, desc);
+    let gauge = Gauge::of(character, desc).watched(watch);
+    let frames = start(clip, desc, desc.fps)?;
     let levers = gauge.levers(clip, &times::coarse(clip, plan::LEVER_MOMENTS));
     let longest = levers.iter().map(|l| l.turn).fold(0.0, f64::max);
-    let (mut part, mut reached, mut time) = (FIRST_PART, 0.0, 0.0);
+    let lever = |b: BoneId| levers[b.index()].turn.max(0.02 * longest).max(1e-9);
+    let mut part = FIRST_PART;
+    let mut last = None;
     for _ in 0..12 {
-        let lever = |b: BoneId| levers[b.index()].turn.max(0.02 * longest).max(1e-9);
-        let path = rewritten(character, clip, form, |b| (part * desc.tolerance / lever(b)).max(FINEST));
+        let allowed = |b: BoneId| (part * desc.tolerance / lever(b)).max(FINEST);
+        let mut path = rewritten(character, &frames, form, desc.fps.is_none(), allowed);
+        if desc.cycle {
+            path = edit::close(&path, SEAM);
+        }
         let worst = gauge.worst(clip, &path, &times::coarse(&path, plan::SEARCH_MOMENTS));
-        let used = worst.share();
-        (reached, time) = (worst.distance, worst.time);
-        if used > 0.5 {
+        if worst.share() > 0.6 && desc.fps.is_none() {
             // Errors of a chain of bones add up.
-            part *= (0.4 / used).min(0.7);
+            part *= (0.4 / worst.share()).min(0.7);
+            let (tolerance, reached, time) = (worst.limit, worst.distance, worst.time);
+            last = Some(BakeError::Missed { clip: clip.name.clone(), tolerance, reached, time });
             continue;
         }
-        let left = BakeDesc {
-            tolerance: (1.0 - used) * desc.tolerance,
-            pins: desc.pins.iter().map(|p| (p.0, (1.0 - used) * p.1)).collect(),
-            ..desc.clone()
-        };
-        let mut baked = bake(character, &path, &left)?;
-        let Verdict { worst, ceiling, moments } = times::verify(&gauge, clip, &baked.clip);
-        let keys = [clip.key_count(), baked.clip.key_count()];
-        let bytes = [plan::bytes(clip, &[]), baked.report.bytes[1]];
-        if ceiling <= 1.0 {
-            baked.report = Report { worst, ceiling, moments, keys, bytes };
-            return Ok(baked);
+        match bake_from(character, clip, &path, desc, watch) {
+            Ok(mut baked) => {
+                baked.report.keys[0] = clip.key_count();
+                baked.report.bytes[0] = plan::bytes(clip, &[]);
+                return Ok(baked);
+            }
+            Err(e) if desc.fps.is_some() => return Err(e),
+            Err(e) => last = Some(e),
         }
-        (reached, time) = (ceiling * worst.limit, worst.time);
-        part *= 0.5;
+        part *= 0.3;
     }
-    Err(BakeError::Missed { clip: clip.name.clone(), tolerance: desc.tolerance, reached, time })
+    Err(last.expect("a try that failed"))
 }
 
 /// All tracks in the form, each within what its bone is allowed, radians.
-fn rewritten(character: &Character, clip: &Clip, form: Form, allowed: impl Fn(BoneId) -> f64) -> Clip {
+fn rewritten(
+    character: &Character,
+    clip: &Clip,
+    form: Form,
+    halve: bool,
+    allowed: impl Fn(BoneId) -> f64,
+) -> Clip {
     let skeleton = character.skeleton();
+    let follow = |b: BoneId, curve: &Curve| {
+        let path = Path { halve, ..Path::new(skeleton, b, curve, form) };
+        path.follow(allowed(b))
+    };
     let track = |t: &Track| match (form, &t.target) {
-        (Form::Angles, Target::Rotation(b)) => Track {
-            target: Target::Xzx(*b),
-            curve: Path::new(skeleton, *b, &t.curve, form).follow(allowed(*b)),
-        },
-        (Form::Quaternions, Target::Xzx(b)) => Track {
-            target: Target::Rotation(*b),
-            curve: Path::new(skeleton, *b, &t.curve, form).follow(allowed(*b)),
-        },
+        (Form::Angles, Target::Rotation(b)) => Track { target: Target::Xzx(*b), curve: follow(*b, &t.curve) },
+        (Form::Quaternions, Target::Xzx(b)) => {
+            Track { target: Target::Rotation(*b), curve: follow(*b, &t.curve) }
+        }
         _ => Track { target: t.target.clone(), curve: t.curve.with_slopes() },
     };
     Clip { name: clip.name.clone(), tracks: clip.tracks.iter().map(track).collect() }
@@ -146,6 +167,8 @@ struct Path<'a> {
     /// For each key of the source, the difference of the twists of the next one that is bent.
     ahead: Vec<f64>,
     allowed: f64,
+    /// Keys may be added between those of the source.
+    halve: bool,
     times: Vec<f64>,
     keys: Vec<Key>,
 }
@@ -154,7 +177,17 @@ impl<'a> Path<'a> {
     fn new(skeleton: &Skeleton, bone: BoneId, source: &'a Curve, form: Form) -> Self {
         let right = skeleton.aim(bone).as_dquat().normalize();
         let left = skeleton.rest(bone).rotation.as_dquat().normalize() * right;
-        Self { source, form, left, right, ahead: vec![], allowed: 0.0, times: vec![], keys: vec![] }
+        Self {
+            source,
+            form,
+            left,
+            right,
+            ahead: vec![],
+            allowed: 0.0,
+            halve: true,
+            times: vec![],
+            keys: vec![],
+        }
     }
 
     fn follow(mut self, allowed: f64) -> Curve {
@@ -224,7 +257,7 @@ impl<'a> Path<'a> {
         let fits = choices.iter().find(|c| self.fits(from, **c, end, [t0, t1])).copied();
         // Halves lie at times that single precision holds, as files do.
         let middle = (0.5 * (t0 + t1)) as f32 as f64;
-        let whole = depth == DEPTH || self.times.len() >= MOST || middle <= t0 || middle >= t1;
+        let whole = !self.halve || depth == DEPTH || self.times.len() >= MOST || middle <= t0 || middle >= t1;
         if let Some(key) = fits.or(whole.then(|| self.choices(end, from)[0])) {
             return self.push(t1, key);
         }

@@ -54,7 +54,11 @@ pub fn gestures(of: Pane) -> &'static [(&'static str, &'static str)] {
 pub fn ui(ctx: &egui::Context, pane: Pane) -> bool {
     let mut open = true;
     let title = format!("{}: gestures and keys", pane.title());
-    let window = egui::Window::new(title).open(&mut open).collapsible(false).resizable(false);
+    let window = egui::Window::new(title)
+        .open(&mut open)
+        .collapsible(false)
+        .resizable(false)
+        .anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0]);
     window.show(ctx, |ui| {
         egui::Grid::new("gestures").num_columns(2).striped(true).show(ui, |ui| {
             for (gesture, what) in gestures(pane) {

@@ -1,6 +1,6 @@
 //! Numbers of the bone that was chosen last: its angles within their limits, its place, its keys.
 
-use super::header::gesture;
+use super::parts::{button, gesture};
 use crate::Bus;
 use crate::commands::named;
 use crate::state::{Change, Command, Edit, Mode, Spans, State, TrackKeys};
@@ -63,7 +63,7 @@ fn head(ui: &mut egui::Ui, bone: BoneId, state: &State, bus: &mut Bus) {
             ("Paste", "Paste pose"),
             ("Mirror", "Paste mirrored pose"),
         ] {
-            super::header::button(ui, text, name, state, bus);
+            button(ui, text, name, state, bus);
         }
     });
     if state.loose.contains_key(&bone) {

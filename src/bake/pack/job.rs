@@ -250,17 +250,18 @@ impl Job {
 
     /// Even pieces: as few as serve, and a few more, which may do with fewer bits each.
     fn even(&mut self, degree: Degree, allowed: f64, best: &mut Option<(Draft, usize)>) {
-        // Two samples a piece, so that no piece is free to go where it likes.
-        let most = (self.samples.len() - 1) / 2;
+        // More samples than pieces, so that none is free to go where it likes.
+        let samples = self.samples.len() - 1;
+        let most = if degree == Degree::Linear { samples / 2 } else { samples * 2 / 3 }.max(1);
         let mut few = None;
         let (mut n, mut failed) = (1, 0);
-        while n <= most {
+        while failed < most {
             if self.fitted(degree, n).1 <= 0.85 * allowed {
                 few = Some(n);
                 break;
             }
             failed = n;
-            n = (n * 5 / 4).max(n + 1);
+            n = (n * 5 / 4).max(n + 1).min(most);
         }
         let Some(mut few) = few else { return };
         while few - failed > 1 + few / 16 {
