@@ -250,7 +250,7 @@ fn bake_from(
         }
         // What hid between the moments of the search: aim a little lower.
         let over = if worst.share() > 1.0 { worst.share() } else { ceiling };
-        baked = plan.within((0.95 / over).min(0.9));
+        baked = plan.within(&gauge, (0.95 / over).min(0.9));
     }
     let plain = plan.untouched();
     let Verdict { worst, ceiling, moments } = times::verify(&gauge, clip, &plain.clip);
