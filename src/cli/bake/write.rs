@@ -91,6 +91,10 @@ pub(super) fn write(
     if folder.canonicalize().ok() != there.canonicalize().ok() {
         out.embed_pictures(Some(folder)).map_err(|e| bad(&e))?;
     }
+    // What came packed does not grow.
+    if args.forms.meshopt || import.extensions.iter().any(|e| e == "EXT_meshopt_compression") {
+        out.compress().map_err(|e| bad(&e))?;
+    }
     put(args, output, &out)
 }
 
