@@ -48,8 +48,8 @@ fn tube() -> (Character, Vec<BoneId>) {
             )
         });
     }
-    quad([at(0, 0), at(0, 3), at(0, 2), at(0, 1)].into_iter().rev().collect::<Vec<_>>().try_into().unwrap());
-    quad([at(8, 0), at(8, 1), at(8, 2), at(8, 3)].into_iter().rev().collect::<Vec<_>>().try_into().unwrap());
+    quad([at(0, 0), at(0, 3), at(0, 2), at(0, 1)]);
+    quad([at(8, 0), at(8, 1), at(8, 2), at(8, 3)]);
     m.targets = vec![MorphTarget {
         positions: m.positions.iter().map(|p| Vec3::new(0.0, p.y, p.z)).collect(),
         ..Default::default()
@@ -110,7 +110,7 @@ fn desc(tolerance: f64) -> BakeDesc {
 }
 
 fn moments() -> impl Iterator<Item = f64> {
-    (0..=3000).map(|k| k as f64 * 1e-3 + 1.37e-5)
+    (0..=1500).map(|k| k as f64 * 2e-3 + 1.37e-5)
 }
 
 /// The farthest that any vertex of two motions is apart, in f64.
@@ -164,7 +164,7 @@ fn no_bytes_break_a_packed_clip() {
     }
     let mut rng = Rng::new(11);
     let mut played = 0;
-    for _ in 0..3000 {
+    for _ in 0..1000 {
         let mut bad = file.clone();
         for _ in 0..1 + rng.next() % 4 {
             let at = (rng.next() % bad.len() as u64) as usize;
@@ -179,7 +179,7 @@ fn no_bytes_break_a_packed_clip() {
             p.to_clip("");
         }
     }
-    assert!(played > 100, "{played}");
+    assert!(played > 30, "{played}");
 }
 
 #[test]
@@ -292,4 +292,31 @@ fn files_carry_their_fewer_influences() {
     assert_eq!(file.bin.len() - out.bin.len(), 136 * 20);
     let again = gltf::import_bytes(&out.glb(), None, "tube.glb", &Options::default()).unwrap();
     assert_eq!(again.asset.character.instances(), import.asset.character.instances());
+}
+
+#[test]
+fn packed_buffers_hold_the_same_character_in_fewer_bytes() {
+    let (c, bones) = tube();
+    let clip = dance(&bones);
+    let asset = Asset { character: c, ..Asset::default() };
+    let new = gltf::NewClip { clip: &clip, short: &[], replaces: None };
+    let (mut file, _) = gltf::write(&asset, &[], &[new], Default::default()).unwrap();
+    let import =
+        |f: &gltf::Rewritten| gltf::import_bytes(&f.glb(), None, "tube.glb", &Options::default()).unwrap();
+    let plain = (import(&file), file.glb().len());
+    file.compress().unwrap();
+    let short = (import(&file), file.glb().len());
+    assert!(
+        file.json["extensionsRequired"][0] == "EXT_meshopt_compression" && file.bin.len() < plain.1 / 2,
+        "{}",
+        file.bin.len()
+    );
+    let [a, b] = [&plain.0, &short.0].map(|i| &i.asset.character);
+    assert!(short.0.warnings.is_empty(), "{:?}", short.0.warnings);
+    assert_eq!((a.instances(), a.clips()), (b.instances(), b.clips()));
+    assert_eq!(a.meshes()[0].positions, b.meshes()[0].positions);
+    // A second time there is nothing left to pack.
+    let once = file.bin.len();
+    file.compress().unwrap();
+    assert_eq!(file.bin.len(), once);
 }

@@ -2,7 +2,7 @@
 
 use super::spline::{Degree, fit};
 use crate::bake::fit::{self as pieces, Kind, Samples};
-use crate::clip::packed::{self, Draft, DraftForm, base_of, step_of, ticks};
+use crate::clip::packed::{self, Draft, DraftForm, Grid, base_of, step_of};
 use crate::clip::{Clip, Curve, Interpolation, Target, Track};
 use crate::time::Range;
 use glam::{DQuat, DVec3};
@@ -28,6 +28,8 @@ pub(super) struct Job {
     pub made: Option<(Draft, usize)>,
     /// Where each sample stands between both ends of the clip.
     x: Vec<f64>,
+    /// Seconds between both ends of the clip.
+    duration: f64,
     /// Rotations are relative to this.
     base: Option<(packed::Base, DQuat)>,
     numbers: Vec<f64>,
@@ -54,6 +56,7 @@ impl Job {
             weight: 1.0,
             made: None,
             x: x.collect(),
+            duration: range.duration(),
             base: None,
             numbers: samples.values.iter().map(|v| *v as f64).collect(),
             width: samples.width,
@@ -172,10 +175,12 @@ impl Job {
         for (k, &t) in self.source.times().iter().enumerate() {
             let v = self.source.value(k);
             if times.last() == Some(&t) {
-                (times.pop(), keys.pop());
+                times.pop();
+                keys.pop();
             }
             if keys.last().is_none_or(|&l| self.samples.distance(self.source.value(l), v) > 0.5 * allowed) {
-                (times.push(t), keys.push(k));
+                times.push(t);
+                keys.push(k);
             }
         }
         let values: Vec<f64> = keys.iter().flat_map(|&k| self.coordinates(self.source.value(k))).collect();
@@ -209,6 +214,26 @@ impl Job {
             }
             None => value.iter().map(|v| *v as f64).collect(),
         }
+    }
+
+    /// The numbers of the source at `x` in 0…1.
+    fn at(&self, x: f64) -> Vec<f64> {
+        let s = &self.samples;
+        let k = self.x.partition_point(|o| *o < x).min(s.len() - 1);
+        // At a sample nothing is to be guessed.
+        if let Some(k) =
+            [k, k.saturating_sub(1)].into_iter().find(|&k| (self.x[k] - x).abs() < 1e-6 / s.len() as f64)
+        {
+            return self.numbers[k * self.width..(k + 1) * self.width].to_vec();
+        }
+        let t = s.times[0] + x * (s.times[s.len() - 1] - s.times[0]);
+        if s.kind != Kind::Rotation {
+            let mut v = vec![0.0; s.width];
+            self.source.sample(t, &mut v);
+            return self.coordinates(&v);
+        }
+        let (q, near) = (self.source.sample_rotation(t), glam::Quat::from_slice(s.value(k)));
+        self.coordinates(&if q.dot(near) < 0.0 { -q } else { q }.to_array())
     }
 
     /// The value that numbers stand for.
@@ -269,7 +294,9 @@ impl Job {
             if self.fitted(degree, middle).1 <= 0.85 * allowed { few = middle } else { failed = middle }
         }
         let own = self.samples.own.len().saturating_sub(1).clamp(1, most);
-        let mut tried = vec![few, few * 17 / 16, few * 9 / 8, few * 5 / 4, few * 3 / 2, own];
+        let usual = (self.duration / spacing(self.source.times())).round();
+        let usual = if usual.is_finite() { (usual as usize).clamp(1, most) } else { own };
+        let mut tried = vec![usual, few, few * 17 / 16, few * 9 / 8, few * 5 / 4, few * 3 / 2, own];
         tried.sort();
         tried.dedup();
         for n in tried {
@@ -287,8 +314,14 @@ impl Job {
     fn fitted(&mut self, degree: Degree, n: usize) -> &(Vec<f64>, f64) {
         if !self.fits.contains_key(&(degree, n)) {
             let c = fit(&self.x, &self.numbers, self.width, degree, n);
-            let off = self.off(degree, n, &c);
-            self.fits.insert((degree, n), (c, off));
+            let mut best = (self.off(degree, n, &c), c);
+            if degree == Degree::Linear {
+                // Where the source has its corners at even times its own values are the best.
+                let c: Vec<f64> = (0..=n).flat_map(|k| self.at(k as f64 / n as f64)).collect();
+                let off = self.off(degree, n, &c);
+                best = if off < best.0 { (off, c) } else { best };
+            }
+            self.fits.insert((degree, n), (best.1, best.0));
         }
         &self.fits[&(degree, n)]
     }
@@ -394,17 +427,27 @@ fn quantised(v: f64, step: f64) -> i32 {
     (v / step).round().clamp(-MOST, MOST) as i32
 }
 
-/// Ticks a second on which all keys that may need times of their own stand.
-pub(super) fn rate(clip: &Clip) -> Option<f32> {
-    let range = clip.range();
-    let times = |t: &&Track| t.curve.times().len() > 1;
-    let longest = clip.tracks.iter().filter(times).max_by_key(|t| t.curve.times().len())?;
-    let even = (longest.curve.times().len() - 1) as f64 / range.duration();
-    let candidates = [24.0, 30.0, 60.0, 25.0, 48.0, 50.0, 120.0, even as f32];
-    let fits = |r: &f32| {
-        let all = clip.tracks.iter().filter(|t| ticks(t.curve.times(), range.start, *r as f64).is_some());
-        all.count() * 2 > clip.tracks.len()
-    };
-    // Midpoints between keys are ticks as well.
-    candidates.into_iter().find(fits)
+/// The moments that most keys, and the middles between them, stand on.
+pub(super) fn grid(clip: &Clip) -> Option<Grid> {
+    let start = clip.range().start;
+    let longest =
+        clip.tracks.iter().map(|t| t.curve.times()).max_by_key(|t| t.len()).filter(|t| t.len() > 1)?;
+    let even = (longest.len() - 1) as f64 / (longest[longest.len() - 1] - longest[0]);
+    let rates = [24.0, 30.0, 60.0, 25.0, 48.0, 50.0, 120.0, even, 1.0 / spacing(longest)];
+    let grids =
+        rates.into_iter().flat_map(|r| [true, false].map(|single| Grid { start, rate: 2.0 * r, single }));
+    let fit =
+        |g: &Grid, exact| clip.tracks.iter().filter(|t| g.ticks(t.curve.times(), exact).is_some()).count();
+    let scored =
+        grids.filter(|g| g.rate.is_finite() && g.rate > 0.0).map(|g| (fit(&g, false), fit(&g, true), g));
+    // The first of the best: rates that people use come first.
+    let best = scored.reduce(|a, b| if (b.0, b.1) > (a.0, a.1) { b } else { a });
+    best.filter(|b| 2 * b.0 > clip.tracks.len()).map(|b| b.2)
+}
+
+/// The usual distance between keys, seconds.
+fn spacing(times: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).copied().unwrap_or(0.0)
 }

@@ -6,7 +6,7 @@ mod spline;
 use super::gauge::Gauge;
 use super::{BakeDesc, BakeError, Report, plan, times};
 use crate::character::Character;
-use crate::clip::packed::{self, Draft, DraftForm};
+use crate::clip::packed::{self, Draft, DraftForm, Grid};
 use crate::clip::{Clip, Packed, Target};
 use job::Job;
 
@@ -69,7 +69,7 @@ struct Search<'a> {
     jobs: Vec<Job>,
     share: f64,
     moments: Vec<f64>,
-    rate: Option<f32>,
+    grid: Option<Grid>,
     work: usize,
 }
 
@@ -103,8 +103,8 @@ impl<'a> Search<'a> {
         let moments = times::coarse(clip, SEARCH_MOMENTS);
         let vertices: usize = character.instances().iter().map(|i| character.mesh(i).positions.len()).sum();
         let work = SEARCH_WORK / (vertices.max(character.skeleton().len()) * moments.len()).max(1);
-        let rate = job::rate(clip);
-        Self { clip, gauge, tolerance: desc.tolerance, jobs, share: 0.5, moments, rate, work }
+        let grid = job::grid(clip);
+        Self { clip, gauge, tolerance: desc.tolerance, jobs, share: 0.5, moments, grid, work }
     }
 
     /// The largest share for all that keeps the bound at the search's moments.
@@ -202,7 +202,7 @@ impl<'a> Search<'a> {
             drafts.push(job.resting());
         }
         let keyed = drafts.iter().any(|d| matches!(d.form, DraftForm::Keys(..)));
-        let bytes = packed::encode(self.clip.range(), self.rate.filter(|_| keyed), &drafts)?;
+        let bytes = packed::encode(self.clip.range(), self.grid.filter(|_| keyed), &drafts)?;
         Packed::from_bytes(&bytes).ok()
     }
 }

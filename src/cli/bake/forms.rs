@@ -36,6 +36,9 @@ pub(super) struct Forms {
     /// Keep this many influences a vertex, the largest, and say what that costs on these clips.
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..=64))]
     influences: Option<u16>,
+    /// Pack all keys, vertices and indices by EXT_meshopt_compression, without loss.
+    #[arg(long, conflicts_with_all = ["pose_at", "vertices"])]
+    pub meshopt: bool,
 }
 
 fn rate(text: &str) -> Result<f64, String> {

@@ -76,9 +76,13 @@ pub(super) fn write(
     // What lies beside the input is not beside an output in another folder.
     let there = output.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let folder = folder(input);
+    let bad = |e| Failure::Input(format!("{}: {e}", input.display()));
     if folder.canonicalize().ok() != there.canonicalize().ok() {
-        let bad = |e| Failure::Input(format!("{}: {e}", input.display()));
         out.embed_pictures(Some(folder)).map_err(bad)?;
+    }
+    // What came packed does not grow.
+    if args.forms.meshopt || import.extensions.iter().any(|e| e == "EXT_meshopt_compression") {
+        out.compress().map_err(bad)?;
     }
     put(args, output, &out)
 }

@@ -38,9 +38,31 @@ pub(crate) fn step_of(code: u8) -> f64 {
     ((code as f64 - 176.0) / 4.0).exp2()
 }
 
-/// The moment of a tick: what exporters write who count frames.
-pub(super) fn tick(start: f64, rate: f64, k: u64) -> f64 {
-    if rate > 0.0 { start + (k as f64 / rate) as f32 as f64 } else { f64::NAN }
+/// Moments that keys stand on: those of frames, as exporters count them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Grid {
+    pub start: f64,
+    /// Ticks a second.
+    pub rate: f64,
+    /// Times are those of single precision.
+    pub single: bool,
+}
+
+impl Grid {
+    pub fn tick(&self, k: u64) -> f64 {
+        let t = k as f64 / self.rate;
+        self.start + if self.single { t as f32 as f64 } else { t }
+    }
+
+    /// Times as ticks, if all of them are some: to a thousandth of a tick, or exactly, where a value jumps.
+    pub fn ticks(&self, times: &[f64], exact: bool) -> Option<Vec<u64>> {
+        let one = |t: &f64| {
+            let k = ((t - self.start) * self.rate).round() as u64;
+            let off = (self.tick(k) - t).abs();
+            (off == 0.0 || !exact && off * self.rate < 1e-3).then_some(k).filter(|k| *k < 1 << 30)
+        };
+        times.iter().map(one).collect()
+    }
 }
 
 /// A quaternion from its smaller components.
@@ -78,7 +100,7 @@ pub(crate) fn size(d: &Draft) -> Option<usize> {
 }
 
 /// Packed bytes of drafts; `None` if numbers are too far apart.
-pub(crate) fn encode(range: Range, rate: Option<f32>, drafts: &[Draft]) -> Option<Vec<u8>> {
+pub(crate) fn encode(range: Range, grid: Option<Grid>, drafts: &[Draft]) -> Option<Vec<u8>> {
     let mut w = BitWriter::default();
     w.put(VERSION.into(), 8);
     w.put(u64::from(range.start != 0.0), 1);
@@ -86,8 +108,11 @@ pub(crate) fn encode(range: Range, rate: Option<f32>, drafts: &[Draft]) -> Optio
         w.seconds(range.start);
     }
     w.seconds(range.end);
-    w.put(u64::from(rate.is_some()), 1);
-    rate.iter().for_each(|r| w.put(r.to_bits().into(), 32));
+    w.put(u64::from(grid.is_some()), 1);
+    if let Some(g) = grid {
+        w.put(g.single.into(), 1);
+        w.seconds(g.rate);
+    }
     let mut sorted: Vec<(&Draft, (u64, u64))> = drafts.iter().map(|d| (d, place(&d.target))).collect();
     sorted.sort_by_key(|d| d.1);
     for kind in 0..5 {
@@ -104,7 +129,7 @@ pub(crate) fn encode(range: Range, rate: Option<f32>, drafts: &[Draft]) -> Optio
     }
     let mut known: &[f64] = &[];
     for (d, _) in sorted {
-        draft(&mut w, d, &mut known, range.start, rate)?;
+        draft(&mut w, d, &mut known, grid)?;
     }
     Some(w.into_bytes())
 }
@@ -119,18 +144,12 @@ fn place(target: &Target) -> (u64, u64) {
     }
 }
 
-fn draft<'d>(
-    w: &mut BitWriter,
-    d: &'d Draft,
-    known: &mut &'d [f64],
-    start: f64,
-    rate: Option<f32>,
-) -> Option<()> {
+fn draft<'d>(w: &mut BitWriter, d: &'d Draft, known: &mut &'d [f64], grid: Option<Grid>) -> Option<()> {
     match &d.form {
         Form::Still => w.put(0, 2),
         Form::Keys(t, hold) => {
             w.put(1, 2);
-            times(w, t, known, start, rate);
+            times(w, t, known, *hold, grid);
             w.put((*hold).into(), 1);
         }
         Form::Even(n) => {
@@ -157,27 +176,19 @@ fn draft<'d>(
     d.lanes.iter().try_for_each(|l| lane::write(w, l))
 }
 
-fn times<'d>(w: &mut BitWriter, t: &'d [f64], known: &mut &'d [f64], start: f64, rate: Option<f32>) {
+fn times<'d>(w: &mut BitWriter, t: &'d [f64], known: &mut &'d [f64], hold: bool, grid: Option<Grid>) {
     w.put(u64::from(t == *known), 1);
     if t == *known {
         return;
     }
     *known = t;
     w.golomb(t.len() as u64 - 1, 3);
-    let ticks = rate.and_then(|r| ticks(t, start, r as f64));
+    let exact = hold || t.windows(2).any(|w| w[0] == w[1]);
+    let ticks = grid.and_then(|g| g.ticks(t, exact));
     w.put(u64::from(ticks.is_some()), 1);
     let Some(ticks) = ticks else { return t.iter().for_each(|t| w.seconds(*t)) };
     let steps: Vec<u64> = ticks.iter().scan(0, |last, t| Some(t - std::mem::replace(last, *t))).collect();
     let width = (64 - steps.iter().max().expect("a key").leading_zeros()).max(1);
     w.put(width.into(), 5);
     steps.iter().for_each(|s| w.put(*s, width));
-}
-
-/// Times as ticks, if all of them are some.
-pub(crate) fn ticks(times: &[f64], start: f64, rate: f64) -> Option<Vec<u64>> {
-    let one = |t: &f64| {
-        let k = ((t - start) * rate).round() as u64;
-        (tick(start, rate, k) == *t && k < 1 << 30).then_some(k)
-    };
-    times.iter().map(one).collect()
 }

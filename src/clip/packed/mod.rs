@@ -9,7 +9,7 @@ mod bits;
 mod draft;
 mod lane;
 
-pub(crate) use draft::{Base, Draft, Form as DraftForm, base_of, encode, size, step_of, ticks};
+pub(crate) use draft::{Base, Draft, Form as DraftForm, Grid, base_of, encode, size, step_of};
 
 use super::{Clip, Curve, Interpolation, Target, Track};
 use crate::math::rotation;
@@ -102,11 +102,11 @@ impl Packed {
     fn read(r: &mut BitReader, place: &mut (usize, &'static str)) -> Option<(Range, Vec<Channel>)> {
         let start = if r.get(1)? == 1 { r.seconds()? } else { 0.0 };
         let range = Range { start, end: r.seconds()? };
-        let rate = if r.get(1)? == 1 { Some(f32::from_bits(r.get(32)?) as f64) } else { None };
-        if !range.duration().is_finite()
-            || range.end < range.start
-            || rate.is_some_and(|r| r.is_nan() || r <= 0.0)
-        {
+        let grid = match r.get(1)? {
+            1 => Some(Grid { start, single: r.get(1)? == 1, rate: r.seconds()? }),
+            _ => None,
+        };
+        if !range.duration().is_finite() || range.end < range.start || grid.is_some_and(|g| g.rate <= 0.0) {
             return None;
         }
         let mut targets = vec![];
@@ -124,15 +124,7 @@ impl Packed {
         let mut times = vec![];
         for (i, (target, width)) in targets.into_iter().enumerate() {
             *place = (i, "times");
-            let track = Channel::read(
-                r,
-                target,
-                width,
-                &mut times,
-                [range, Range { start, end: rate.unwrap_or(0.0) }],
-                &mut room,
-                place,
-            )?;
+            let track = Channel::read(r, target, width, &mut times, (range, grid), &mut room, place)?;
             tracks.push(track);
         }
         Some((range, tracks))
@@ -222,7 +214,7 @@ impl Channel {
         target: Target,
         width: usize,
         known: &mut Vec<f64>,
-        [range, grid]: [Range; 2],
+        (range, grid): (Range, Option<Grid>),
         room: &mut usize,
         place: &mut (usize, &'static str),
     ) -> Option<Self> {
@@ -378,18 +370,18 @@ impl Channel {
 }
 
 /// Times of keys: those of the track before, or on a grid, or each for itself.
-fn read_times(r: &mut BitReader, known: &mut Vec<f64>, grid: Range) -> Option<Vec<f64>> {
+fn read_times(r: &mut BitReader, known: &mut Vec<f64>, grid: Option<Grid>) -> Option<Vec<f64>> {
     if r.get(1)? == 1 {
         return Some(known.clone()).filter(|k| !k.is_empty());
     }
     let count = r.golomb(3)? as usize + 1;
     let mut times: Vec<f64> = vec![];
     if r.get(1)? == 1 {
-        let (width, mut k) = (r.get(5)?, 0_u64);
+        let (grid, width, mut k) = (grid?, r.get(5)?, 0_u64);
         for _ in 0..count {
             // Each takes a bit at least, or all are one.
             k += u64::from(r.get(width.max(1))?);
-            times.push(draft::tick(grid.start, grid.end, k));
+            times.push(grid.tick(k));
         }
     } else {
         for _ in 0..count {

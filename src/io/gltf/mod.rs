@@ -9,6 +9,7 @@ mod bake;
 mod beside;
 mod carried;
 mod clips;
+mod compress;
 mod compressed;
 mod container;
 mod document;

@@ -517,7 +517,7 @@ fn renumbered(gone: &[bool]) -> Vec<u64> {
         .collect()
 }
 
-fn renumber(v: &mut Value, new: &[u64]) {
+pub(super) fn renumber(v: &mut Value, new: &[u64]) {
     if let Some(&k) = v.as_u64().and_then(|i| new.get(i as usize)) {
         *v = k.into();
     }
@@ -531,7 +531,7 @@ fn view_places_of(accessor: &mut Value, visit: &mut impl FnMut(&mut Value)) {
 }
 
 /// All indices of buffer views.
-fn view_places(json: &mut Map<String, Value>, visit: &mut impl FnMut(&mut Value)) {
+pub(super) fn view_places(json: &mut Map<String, Value>, visit: &mut impl FnMut(&mut Value)) {
     list(json, "accessors").iter_mut().for_each(|a| view_places_of(a, visit));
     for i in list(json, "images") {
         i.get_mut("bufferView").into_iter().for_each(&mut *visit);
@@ -542,13 +542,13 @@ fn view_places(json: &mut Map<String, Value>, visit: &mut impl FnMut(&mut Value)
 }
 
 /// Where a packed view says what its bytes are.
-fn packing(view: &Value) -> Option<&'static str> {
+pub(super) fn packing(view: &Value) -> Option<&'static str> {
     let places = ["/extensions/EXT_meshopt_compression", "/extensions/KHR_meshopt_compression"];
     places.into_iter().find(|p| view.pointer(p).is_some())
 }
 
 /// What names a view's bytes: buffer, offset and length.
-fn source(view: &mut Value) -> &mut Value {
+pub(super) fn source(view: &mut Value) -> &mut Value {
     match packing(view) {
         Some(place) => view.pointer_mut(place).expect("just seen"),
         None => view,
