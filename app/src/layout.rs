@@ -73,6 +73,7 @@ pub(crate) struct Panes<'a> {
 
 impl Behavior<Pane> for Panes<'_> {
     fn pane_ui(&mut self, ui: &mut egui::Ui, _: TileId, pane: &mut Pane) -> UiResponse {
+        ui.painter().rect_filled(ui.max_rect(), 0.0, ui.visuals().panel_fill);
         if ui.rect_contains_pointer(ui.max_rect()) {
             self.panels.hovered = Some(*pane);
         }

@@ -34,7 +34,8 @@ impl Drop for Folder {
 
 /// Frames until the job is done.
 pub fn wait(p: &mut Person) {
-    for _ in 0..6000 {
+    let start = std::time::Instant::now();
+    while start.elapsed().as_secs() < 900 {
         p.ui.step();
         if !p.ui.state().jobs.busy() {
             return p.ui.run_steps(3);

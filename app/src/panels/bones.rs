@@ -114,7 +114,8 @@ impl Bones {
         let loose = state.loose.contains_key(&bone);
         let color = if loose { Color32::from_rgb(255, 150, 60) } else { visuals.text_color() };
         let at = pos2(left + 14.0, rect.center().y);
-        ui.painter().text(at, Align2::LEFT_CENTER, name, FontId::proportional(12.5), color);
+        let names = ui.painter_at(rect.with_max_x(rect.right() - 18.0));
+        names.text(at, Align2::LEFT_CENTER, name, FontId::proportional(12.5), color);
         if keyed {
             let mut mesh = egui::Mesh::default();
             super::axis::diamond(

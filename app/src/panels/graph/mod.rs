@@ -215,6 +215,8 @@ impl Graph {
         levels(&painter, values, ui.visuals());
         let mut mesh = egui::Mesh::default();
         let mut names = Names(ui);
+        // Slopes of many keys would hide the curves.
+        let few = state.selection.key_count() <= 24;
         for c in channels {
             curve(&inner, axis, values, c);
             let chosen = state.selection.keys.get(&(c.track as u32)).filter(|k| k.mask & c.bit() != 0);
@@ -226,7 +228,7 @@ impl Graph {
                 let (t, v) = c.key(k);
                 let at = pos2(axis.x(t), values.y(v));
                 let on = chosen.is_some_and(|s| s.spans.contains(k));
-                if on {
+                if on && few {
                     tangent(&inner, axis, values, c, k, at);
                 }
                 axis::diamond(&mut mesh, at, if on { 5.5 } else { 4.5 }, if on { SELECTED } else { c.color });
