@@ -187,3 +187,43 @@ fn turns_that_one_arc_cannot_hold_get_keys_between() {
     }
     assert_eq!(done.unmatched_source, [BoneId(2)]);
 }
+
+#[cfg(feature = "cli")]
+#[test]
+fn the_program_carries_a_capture_onto_a_rig_and_says_what_nothing_follows() {
+    use crate::cli::{fails, folder, path, sinew, text};
+    let (dir, rig) = folder();
+    let bvh = path(&dir, "wave.bvh");
+    let capture = "HIERARCHY ROOT Pole { OFFSET 0 0 0 CHANNELS 1 Zrotation JOINT Knob { OFFSET 0 1 0 CHANNELS 1 Xrotation } }
+        MOTION Frames: 3 Frame Time: .5\n 0 0\n 40 10\n 0 0";
+    std::fs::write(&bvh, capture).unwrap();
+    let (glb, map) = (path(&dir, "out.glb"), path(&dir, "map.json"));
+    let (code, said) = fails(&["bake", &rig, "--motion", &bvh, "-o", &glb]);
+    assert!(code == 2 && said.contains("none of its bones is one of the input's"), "{said}");
+    std::fs::write(&map, r#"{"bones": {"Pole": "mast"}}"#).unwrap();
+    let with_map = ["bake", &rig, "--motion", &bvh, "--retarget", &map, "-o", &glb, "--json"];
+    let (code, said) = fails(&with_map);
+    assert!(code == 2 && said.contains("`mast` is no bone of the input"), "{said}");
+    std::fs::write(&map, r#"{"bones": {"Pole": "flag"}, "scale": 1}"#).unwrap();
+    let out = sinew(&with_map);
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    let told: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!(told["motions"][0]["unmatched_source"], serde_json::json!(["Knob"]));
+    assert!(text(&out.stderr).contains("Knob"));
+
+    // The flag's tip goes where the pole's does; and the file is a rig again.
+    let at = |file: &str| {
+        let c = sinew::io::import(std::path::Path::new(file), &Default::default()).unwrap().asset.character;
+        let pose = c.pose(Some(0), 0.5);
+        c.posed(&pose).world_from_bone(c.skeleton().find("flag").unwrap()).transform_vector3(DVec3::X)
+    };
+    let forty = 40_f64.to_radians();
+    assert!(at(&glb).distance(DVec3::new(forty.cos(), forty.sin(), 0.0)) < 1e-3, "{}", at(&glb));
+    let again = path(&dir, "again.json");
+    assert!(sinew(&["bake", &glb, "-o", &again]).status.success());
+    assert!(at(&again).distance(at(&glb)) < 1e-3);
+    let poses = std::fs::read_to_string(path(&dir, "again.poses.json")).unwrap();
+    assert!(poses.contains("xzx_deg") && !poses.contains("rotation"), "{poses}");
+    let (code, said) = fails(&["bake", &glb, "--to", "xzx", "-o", &path(&dir, "b.glb")]);
+    assert!(code == 2 && said.contains("no place for angles"), "{said}");
+}

@@ -31,7 +31,7 @@ pub struct Map {
 
 impl Map {
     /// Pairs by name: those given (`None`: no bone follows this one), then equal names, then names that are equal but for case,
-    /// separators and what stands before a colon (`mixamorig:LeftArm` is `left_arm`).
+    /// separators and what stands before a colon (`mixamorig:LeftArm` is `left_arm`). Bones point where the source's do.
     ///
     /// ```
     /// use sinew::{bake::retarget::Map, skeleton::{BoneDesc, Skeleton}};
@@ -57,7 +57,8 @@ impl Map {
                 }
             }
         }
-        Self { pairs: of.into_iter().filter_map(|(s, t)| Some((s, t?))).collect(), ..Self::default() }
+        let pairs = of.into_iter().filter_map(|(s, t)| Some((s, t?))).collect();
+        Self { pairs, scale: None, directions: true }
     }
 }
 

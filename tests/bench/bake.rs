@@ -85,8 +85,10 @@ fn breakdown(file: &Path) {
             }
             (s.1, s.2) = (stage, Instant::now());
         };
-        *spent.lock().expect("one thread") =
-            (spent.lock().expect("one thread").0, Stage::Levers, Instant::now());
+        {
+            let mut s = spent.lock().expect("one thread");
+            (s.1, s.2) = (Stage::Levers, Instant::now());
+        }
         let baked =
             bake_watched(character, clip, &desc, &|stage, _| enter(stage)).expect("a bound that holds");
         enter(Stage::Levers);

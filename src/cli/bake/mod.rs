@@ -17,6 +17,7 @@ use report::Done;
 use serde_json::{Value, json};
 use sinew::bake::edit::EditError;
 use sinew::bake::{BakeDesc, BakeError, Gauge, Goal, Metric, Stage};
+use sinew::clip::Clip;
 use sinew::io::{Import, Options};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -243,6 +244,7 @@ fn one(
     let bar = say.clip_progress(edited.len());
     let mut done = vec![];
     for e in &edited {
+        tell_coarse_times(&e.clip, say);
         let desc = BakeDesc { cycle: e.cycle, over: e.over.clone(), ..desc.clone() };
         let poses = AtomicUsize::new(0);
         let watch = |stage: Stage, n: usize| {
@@ -274,6 +276,18 @@ fn one(
         say.note(&format!("wrote {}", output.display()));
     }
     Ok(())
+}
+
+/// Late keys that single precision does not tell apart 240 times a second.
+fn tell_coarse_times(clip: &Clip, say: &Say) {
+    let end = clip.range().end as f32;
+    let step = end.next_up() - end;
+    if step > 1.0 / 240.0 && step < 1.0 {
+        let name = say::name(&clip.name);
+        say.warn(&format!(
+            "clip {name}: its keys at {end} s are stored in single precision, {step} s apart at best"
+        ));
+    }
 }
 
 fn failure(e: BakeError) -> Failure {

@@ -16,18 +16,20 @@ pub(super) struct Motion {
     #[arg(long, value_name = "FILE")]
     motion: Vec<PathBuf>,
     /// Which bone of the motion moves which of the input, as in {"bones": {"Hips": "pelvis", "Prop": null}, "scale": "auto",
-    /// "directions": false}. `scale` is a number, or the ratio of the legs; with `directions` bones point where the motion's do, whatever
-    /// the rest poses are.
+    /// "directions": true}. `scale` is a number, or the ratio of the legs; with `directions` bones point where the motion's do, whatever
+    /// the rest poses are (arms spread or hanging), without them they turn from rest as the motion's do.
     #[arg(long, value_name = "MAP.json", requires = "motion")]
     retarget: Option<PathBuf>,
 }
 
-#[derive(Deserialize, Default)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct File {
+    #[serde(default)]
     bones: BTreeMap<String, Option<String>>,
+    #[serde(default)]
     scale: Scale,
-    directions: bool,
+    directions: Option<bool>,
 }
 
 #[derive(Deserialize)]
@@ -141,5 +143,5 @@ fn map(file: Option<&File>, source: &Skeleton, target: &Skeleton) -> Result<Map,
         Scale::Number(n) => return Err(format!("scale: expected a number above 0 or \"auto\", found {n}")),
         Scale::Word(Auto::Auto) => None,
     };
-    Ok(Map { scale, directions: file.directions, ..Map::by_names(source, target, &given) })
+    Ok(Map { scale, directions: file.directions.unwrap_or(true), ..Map::by_names(source, target, &given) })
 }
