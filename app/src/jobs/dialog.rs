@@ -103,6 +103,13 @@ fn path_line(ui: &mut egui::Ui, path: &mut String) -> Answer {
     answer
 }
 
+/// What is written replaces what is there.
+fn warn_of_loss(ui: &mut egui::Ui, path: &str) {
+    if Path::new(path.trim()).is_file() {
+        ui.colored_label(ui.visuals().warn_fg_color, "This file exists and will be replaced.");
+    }
+}
+
 /// Two buttons; the first does it.
 fn choice(ui: &mut egui::Ui, name: &str, before: Answer) -> Answer {
     let mut answer = before;
@@ -141,6 +148,7 @@ impl Ask {
             }
             Self::Save { path } => {
                 let answer = path_line(ui, path);
+                warn_of_loss(ui, path);
                 choice(ui, "Write", answer)
             }
             Self::Export(export) => {
@@ -194,6 +202,7 @@ impl Export {
             }
         });
         let answer = path_line(ui, &mut self.path);
+        warn_of_loss(ui, &self.path);
         if self.kind != "GLB" {
             ui.horizontal(|ui| {
                 for (k, name) in ["Width", "Height"].into_iter().enumerate() {

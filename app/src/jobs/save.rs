@@ -28,6 +28,10 @@ pub fn save(
     asset: &Asset,
     clips: &[Clip],
 ) -> Result<Vec<String>, String> {
+    if !to.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
+        let hint = "expected a name that ends in .json; glTF and pictures are exported";
+        return Err(format!("{}: {hint}", to.display()));
+    }
     let own = source.is_some_and(|s| s.kind == Kind::Rig && s.path == to);
     if own {
         return poses_of(to, &asset.character, clips);

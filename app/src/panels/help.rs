@@ -9,11 +9,13 @@ pub fn gestures(of: Pane) -> &'static [(&'static str, &'static str)] {
         Pane::Viewport => &[
             ("Click", "select a bone"),
             ("Shift + click", "one more or less"),
-            ("Drag a ring", "twist, bend, twist, or turn freely"),
+            ("Drag a ring", "twist, bend, twist, or turn freely; Ctrl goes by 5°"),
+            ("Drag an arrow", "move a root, or a bone with keys of its place"),
             ("Drag the end of a chain", "pull the chain"),
-            ("Middle drag", "look around"),
-            ("Shift + middle drag", "move sideways"),
-            ("Wheel", "nearer and further"),
+            ("Middle drag, or on empty ground", "look around"),
+            ("Shift + middle drag, right drag", "move sideways"),
+            ("Wheel", "nearer and further, at the pointer"),
+            ("Home, .", "look at all, or at the selected bones"),
             ("Esc", "cancel the drag"),
         ],
         Pane::Bones => &[

@@ -2,7 +2,7 @@
 
 use super::orbit::Lens;
 use crate::state::{Change, State};
-use glam::{DQuat, DVec3};
+use glam::{DAffine3, DQuat, DVec3};
 use sinew::clip::Target;
 use sinew::fk::Posed;
 use sinew::ik;
@@ -57,24 +57,24 @@ pub struct Gizmo {
     pub arrows: Option<f64>,
 }
 
-/// Rotation of what a bone is posed against.
-fn above(skeleton: &Skeleton, posed: &Posed, pose: &Pose, bone: BoneId) -> DQuat {
-    let m = skeleton.parent(bone).map_or(pose.placement, |p| posed.world_from_bone(p));
+/// Rotation of what a bone is posed against; an edited character stands at the origin.
+fn above(skeleton: &Skeleton, posed: &Posed, bone: BoneId) -> DQuat {
+    let m = skeleton.parent(bone).map_or(DAffine3::IDENTITY, |p| posed.world_from_bone(p));
     let q = m.to_scale_rotation_translation().1;
     if q.is_finite() { q.normalize() } else { DQuat::IDENTITY }
 }
 
 impl Gizmo {
-    /// Handles of the bone chosen last.
-    pub fn of(state: &State, posed: &Posed, lens: &Lens) -> Option<Self> {
-        let (bone, skeleton) = (state.selection.active()?, state.document.skeleton());
+    /// Handles of a bone; none where it never moves.
+    pub fn of(state: &State, bone: BoneId, posed: &Posed, lens: &Lens) -> Option<Self> {
+        let skeleton = state.document.skeleton();
         if skeleton.fixed(bone).is_some() || bone.index() >= posed.len() {
             return None;
         }
         let [origin, tip] = super::ends(skeleton, posed, bone);
         let radius = 80.0 * lens.metres(origin);
         let rest = skeleton.rest(bone).rotation.as_dquat() * skeleton.aim(bone).as_dquat();
-        let frame = above(skeleton, posed, &state.pose(), bone) * rest.normalize();
+        let frame = above(skeleton, posed, bone) * rest.normalize();
         let theta = state.theta(bone).as_dvec3();
         let outer = frame * DQuat::from_rotation_x(theta.z);
         let inner = outer * DQuat::from_rotation_z(theta.y);
@@ -178,7 +178,7 @@ impl Hold {
             None => 0.0,
         };
         let start = gizmo.grip(lens, part, at)?;
-        let (theta, above) = (state.theta(bone), above(skeleton, posed, &pose, bone));
+        let (theta, above) = (state.theta(bone), above(skeleton, posed, bone));
         let chain = ik::chain(skeleton, bone, count);
         Some(Self { part, pose, theta, above, start, last, total: 0.0, chain, gizmo })
     }
@@ -220,7 +220,7 @@ impl Hold {
                 let by = self.gizmo.grip(lens, self.part, at).map_or(DVec3::ZERO, |p| p - self.start);
                 let skeleton = state.document.skeleton();
                 let posed = state.document.asset.character.posed(&self.pose);
-                let up = skeleton.parent(bone).map_or(self.pose.placement, |p| posed.world_from_bone(p));
+                let up = skeleton.parent(bone).map_or(DAffine3::IDENTITY, |p| posed.world_from_bone(p));
                 let by = (up.matrix3.inverse() * by).as_vec3();
                 vec![(bone, Change::Translation(local.translation + by))]
             }

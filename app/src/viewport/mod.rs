@@ -198,7 +198,7 @@ impl Viewport {
     }
 
     fn gizmo(&self, state: &State, lens: &Lens) -> Option<Gizmo> {
-        Gizmo::of(state, self.picture.posed()?, lens)
+        Gizmo::of(state, state.selection.active()?, self.picture.posed()?, lens)
     }
 
     /// Take what is below a pressed pointer: a handle, the end of a chain, or the camera.
@@ -215,12 +215,10 @@ impl Viewport {
             return Drag::Turn;
         }
         let Some(posed) = self.picture.posed() else { return Drag::Turn };
-        let handle = Gizmo::of(state, posed, lens).and_then(|g| Some((g.hit(lens, at, REACH)?, g, None)));
+        let handle = self.gizmo(state, lens).and_then(|g| Some((g.hit(lens, at, REACH)?, g, None)));
         let end = || {
             let bone = self.end_at(state, posed, lens, at)?;
-            let mut alone = state.clone();
-            alone.update(Command::SelectBones(vec![bone], Mode::Replace)).ok()?;
-            Some((Part::Tip, Gizmo::of(&alone, posed, lens)?, Some(bone)))
+            Some((Part::Tip, Gizmo::of(state, bone, posed, lens)?, Some(bone)))
         };
         let Some((part, gizmo, chosen)) = handle.or_else(end) else { return Drag::Turn };
         let Some(hold) = Hold::new(state, posed, lens, gizmo, part, at, self.chain) else {
@@ -292,7 +290,7 @@ impl Viewport {
             Some(Drag::Hold(_, part)) => Some(*part),
             _ => None,
         };
-        if let Some(g) = Gizmo::of(state, posed, &lens) {
+        if let Some(g) = self.gizmo(state, &lens) {
             overlay::gizmo(&painter, &lens, &g, held);
             self.name_handles(ui, state, &lens, &g);
         }

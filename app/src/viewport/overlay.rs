@@ -45,8 +45,10 @@ pub fn ground(painter: &Painter, lens: &Lens) {
 /// Bones as lines with a dot at their origins.
 pub fn sticks(painter: &Painter, lens: &Lens, state: &State, posed: &Posed) {
     let skeleton = state.document.skeleton();
+    let mut chosen = vec![false; skeleton.len()];
+    state.selection.bones.iter().for_each(|b| chosen[b.index()] = true);
     for bone in skeleton.ids() {
-        let color = if state.selection.bones.contains(&bone) { CHOSEN } else { BONE };
+        let color = if chosen[bone.index()] { CHOSEN } else { BONE };
         let [origin, tip] = super::ends(skeleton, posed, bone);
         line(painter, lens, origin, tip, Stroke::new(2.0, color));
         at(lens, origin).map(|p| painter.circle_filled(p, 2.5, color));

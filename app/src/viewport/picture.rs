@@ -2,7 +2,7 @@
 
 use super::Cost;
 use super::orbit::Orbit;
-use crate::state::{BoneStyle, Quality, State};
+use crate::state::{BoneStyle, EditClip, Loose, Quality, State};
 use egui::{Color32, ColorImage, TextureHandle, TextureOptions};
 use glam::DVec3;
 use sinew::asset::Asset;
@@ -10,6 +10,8 @@ use sinew::fk::Posed;
 use sinew::frames::{BonesDesc, Live, Look};
 use sinew::image::Rgba8;
 use sinew::render::Settings;
+use sinew::skeleton::BoneId;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Ghosts of other moments, and how much of each is seen.
@@ -28,9 +30,48 @@ pub struct Picture {
     pub body: Option<TextureHandle>,
     /// Its bones.
     pub bones: Option<TextureHandle>,
-    of: Option<(u64, Orbit, [usize; 2], bool)>,
+    of: Option<Seen>,
     /// Pictures drawn since the start.
     pub drawn: u64,
+}
+
+/// All that a picture depends on; whatever else changes, it is not drawn again.
+#[derive(Clone)]
+struct Seen {
+    clip: Arc<EditClip>,
+    time: f64,
+    frame: f64,
+    loose: BTreeMap<BoneId, Loose>,
+    chosen: Vec<BoneId>,
+    view: (Quality, BoneStyle, bool),
+    orbit: Orbit,
+    size: [usize; 2],
+    moving: bool,
+}
+
+impl Seen {
+    fn of(state: &State, orbit: &Orbit, size: [usize; 2], moving: bool) -> Self {
+        let v = &state.view;
+        Self {
+            clip: state.document.clips[state.clip].clone(),
+            time: state.time,
+            frame: state.frame_seconds(),
+            loose: state.loose.clone(),
+            chosen: state.selection.bones.clone(),
+            view: (v.quality, v.bones, v.onion),
+            orbit: *orbit,
+            size,
+            moving,
+        }
+    }
+
+    fn same(&self, o: &Self) -> bool {
+        Arc::ptr_eq(&self.clip, &o.clip)
+            && (self.time, self.frame, self.view, self.orbit) == (o.time, o.frame, o.view, o.orbit)
+            && (self.size, self.moving) == (o.size, o.moving)
+            && self.loose == o.loose
+            && self.chosen == o.chosen
+    }
 }
 
 impl Picture {
@@ -66,12 +107,7 @@ impl Picture {
     }
 
     /// The bone below a pixel of the pane.
-    pub fn bone_at(
-        &mut self,
-        orbit: &Orbit,
-        size: [usize; 2],
-        at: [usize; 2],
-    ) -> Option<sinew::skeleton::BoneId> {
+    pub fn bone_at(&mut self, orbit: &Orbit, size: [usize; 2], at: [usize; 2]) -> Option<BoneId> {
         let (asset, live) = self.live.as_mut()?;
         let camera = orbit.camera(live.center());
         let settings = Settings { width: size[0], height: size[1], samples: 1, threads: 1 };
@@ -93,11 +129,11 @@ impl Picture {
         // Edges are smoothed at rest, or always.
         let quality = state.view.quality;
         let moving = moving && quality == Quality::Normal;
-        let of = (state.revision, *orbit, size, moving);
-        if self.of == Some(of) || size.contains(&0) {
+        let now = Seen::of(state, orbit, size, moving);
+        if size.contains(&0) || self.of.as_ref().is_some_and(|of| of.same(&now)) {
             return None;
         }
-        self.of = Some(of);
+        self.of = Some(now);
         self.drawn += 1;
         let shrink = if quality == Quality::Draft { 2 } else { 1 };
         let [width, height] = size.map(|s| s.div_ceil(shrink).min(Settings::MAX_SIZE));
