@@ -18,6 +18,9 @@ fn from_the_first_bone_to_the_last_frame() {
     let start = p.state().document.clone();
     p.menu("Clip", "New clip");
     assert!(p.state().active().tracks.is_empty());
+    p.click("Clip to edit");
+    p.type_into("Name of this clip", "kneel");
+    assert_eq!(p.state().active().name, "kneel");
 
     // Three poses of a knee and a hip, by typed numbers.
     for (frame, bend) in [("0", "10"), ("12", "70"), ("24", "10")] {

@@ -205,20 +205,16 @@ fn markers(
 
 /// Another name, or none.
 fn marker_menu(ui: &mut egui::Ui, marker: &Marker, bus: &mut Bus) {
-    let id = ui.scope_id().with("name");
-    let mut name = ui.data(|d| d.get_temp(id)).unwrap_or_else(|| marker.name.clone());
-    let field = ui.text_edit_singleline(&mut name).accessible_name("Name of the marker");
-    ui.data_mut(|d| d.insert_temp(id, name.clone()));
-    let done = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
-    if done {
-        bus.send(Command::Do(Edit::SetMarker(Marker { name, ..marker.clone() })));
-    }
+    let name = super::parts::name(ui, "Name of the marker", &marker.name);
     let gone = ui.button("Remove marker").clicked();
     if gone {
         bus.send(Command::Do(Edit::RemoveMarker(marker.time)));
     }
+    let done = name.is_some();
+    name.into_iter().for_each(|name| {
+        bus.send(Command::Do(Edit::SetMarker(Marker { name, ..marker.clone() })));
+    });
     if done || gone {
-        ui.data_mut(|d| d.remove_temp::<String>(id));
         ui.close();
     }
 }

@@ -125,12 +125,20 @@ fn menu_items(ui: &mut egui::Ui, menu: &str, state: &State, bus: &mut Bus) {
 }
 
 fn clips(ui: &mut egui::Ui, state: &State, bus: &mut Bus) {
-    let combo = egui::ComboBox::from_id_salt("clip").selected_text(&state.active().name);
+    let combo = egui::ComboBox::from_id_salt("clip")
+        .close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside)
+        .selected_text(&state.active().name);
     let shown = combo.show_ui(ui, |ui| {
         for (i, clip) in state.document.clips.iter().enumerate() {
             if ui.selectable_label(i == state.clip, &clip.name).clicked() {
                 bus.send(Command::SelectClip(i));
+                ui.close();
             }
+        }
+        ui.separator();
+        if let Some(name) = super::parts::name(ui, "Name of this clip", &state.active().name) {
+            bus.send(Command::Do(Edit::RenameClip(name)));
+            ui.close();
         }
     });
     shown.response.on_hover_text("The clip that is edited").accessible_name("Clip to edit");

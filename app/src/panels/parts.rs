@@ -40,6 +40,19 @@ pub fn menu(ui: &mut egui::Ui, of: &[&str], state: &State, bus: &mut Bus) {
     }
 }
 
+/// A name to be typed; given back when Enter ends it.
+pub fn name(ui: &mut egui::Ui, what: &str, now: &str) -> Option<String> {
+    let id = ui.scope_id().with((what, now));
+    let mut name = ui.data(|d| d.get_temp(id)).unwrap_or_else(|| now.to_owned());
+    let field = ui.text_edit_singleline(&mut name).accessible_name(what);
+    if field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) {
+        ui.data_mut(|d| d.remove_temp::<String>(id));
+        return Some(name);
+    }
+    ui.data_mut(|d| d.insert_temp(id, name));
+    None
+}
+
 /// A button that does an action; its name and help are the action's.
 pub fn button(ui: &mut egui::Ui, text: &str, name: &str, state: &State, bus: &mut Bus) {
     let action = named(name);
