@@ -87,7 +87,7 @@ fn walker(end: f32) -> Vec<u8> {
         "scenes": [{"nodes": [0]}],
         "scene": 0,
         "nodes": [
-            {"name": "armature", "rotation": [-0.70710678, 0.0, 0.0, 0.70710678], "scale": [0.01, 0.01, 0.01], "children": [1]},
+            {"name": "armature", "rotation": [-std::f64::consts::FRAC_1_SQRT_2, 0.0, 0.0, std::f64::consts::FRAC_1_SQRT_2], "scale": [0.01, 0.01, 0.01], "children": [1]},
             {"name": "hip", "children": [2, 3], "mesh": 0, "translation": [0, 0, 90]},
             {"name": "arm.L", "mesh": 0, "translation": [20, 0, 10]},
             {"name": "arm.R", "mesh": 0, "translation": [-20, 0, 10]},

@@ -103,8 +103,10 @@ fn moments() -> impl Iterator<Item = f64> {
     (0..=1500).map(|k| k as f64 * 2e-3 + 1.37e-5)
 }
 
+type Motion<'a> = &'a dyn Fn(f64, &mut Pose);
+
 /// The farthest that any vertex of two motions is apart, in f64.
-fn apart(c: [&Character; 2], motions: [&dyn Fn(f64, &mut Pose); 2]) -> f64 {
+fn apart(c: [&Character; 2], motions: [Motion; 2]) -> f64 {
     let positions = |k: usize, t: f64| {
         let mut pose = c[k].rest_pose();
         motions[k](t, &mut pose);

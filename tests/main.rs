@@ -27,6 +27,8 @@ mod looks;
 mod picture;
 mod raster;
 mod ray;
+#[cfg(feature = "io")]
+mod retarget;
 #[path = "../src/test_rng.rs"]
 mod rng;
 #[cfg(feature = "cli")]
@@ -37,3 +39,5 @@ mod sheet;
 mod shots;
 #[cfg(all(feature = "io", feature = "pictures"))]
 mod views;
+#[cfg(all(feature = "io", feature = "pictures"))]
+mod xzx;

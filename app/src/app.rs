@@ -16,6 +16,12 @@ pub fn set_up(ctx: &egui::Context) {
     fonts.families.entry(egui::FontFamily::Proportional).or_default().push("Hack".into());
     ctx.set_fonts(fonts);
     ctx.set_theme(egui::Theme::Dark);
+    ctx.style_mut_of(egui::Theme::Dark, |style| {
+        // The light font needs more contrast than the theme gives it.
+        style.visuals.widgets.noninteractive.fg_stroke.color = egui::Color32::from_gray(205);
+        style.visuals.widgets.inactive.fg_stroke.color = egui::Color32::from_gray(215);
+        style.visuals.weak_text_color = Some(egui::Color32::from_gray(150));
+    });
 }
 
 /// What panes ask for while they draw; done when the last has drawn.
@@ -70,6 +76,8 @@ pub struct App {
 
 /// Where settings are kept between runs.
 const KEPT: &str = "sinew-app";
+/// And files that were opened.
+const FILES: &str = "sinew-app files";
 
 impl App {
     /// A document, opened, in panes where they were at first.
@@ -90,6 +98,7 @@ impl App {
         if let Some((tree, view)) = eframe::get_value(storage, KEPT) {
             (self.tree, self.state.view) = (tree, view);
         }
+        self.jobs.recent = eframe::get_value(storage, FILES).unwrap_or_default();
     }
 
     /// One frame.
@@ -103,8 +112,15 @@ impl App {
         egui::Panel::top("header").show(ui, |ui| panels.header.ui(ui, state, bus));
         egui::Panel::bottom("status").show(ui, |ui| panels.status.ui(ui, state, viewport, bus));
         egui::CentralPanel::no_frame().show(ui, |ui| {
+            let rect = ui.max_rect();
             tree.ui(&mut layout::Panes { state, viewport, panels, bus }, ui);
+            // Automatic keys cannot be missed, wherever one looks.
+            if state.auto_key {
+                let red = egui::Stroke::new(2.0, egui::Color32::from_rgb(220, 40, 40));
+                ui.painter().rect_stroke(rect, 0.0, red, egui::StrokeKind::Inside);
+            }
         });
+        jobs.camera = viewport.orbit;
         jobs.ui(&ctx, state, bus);
         panels.over(&ctx, state, bus);
         self.settle(&ctx);
@@ -123,16 +139,22 @@ impl App {
     fn tick(&mut self, ctx: &egui::Context) {
         let now = ctx.input(|i| i.time);
         let dt = now - self.last_time.replace(now).unwrap_or(now);
-        if self.state.playback.playing.is_some() {
-            let frame = self.state.frame_seconds();
-            if !self.state.playback.every_frame || self.panels.header.due(now, frame) {
-                self.bus.send(Command::Tick(dt));
-            }
-            // Real time shows as many frames as the screen does; every frame waits for its own.
-            let wait =
-                if self.state.playback.every_frame { self.panels.header.wait(now, frame) } else { 0.0 };
-            ctx.request_repaint_after(Duration::from_secs_f64(wait));
+        let p = self.state.playback;
+        if p.playing.is_none() {
+            self.panels.header.stopped();
+            return;
         }
+        // Real time shows as many frames as the screen does; every frame waits for its own.
+        let wait = if p.every_frame {
+            self.panels.header.wait(now, self.state.frame_seconds() / p.speed)
+        } else {
+            0.0
+        };
+        if wait <= 1e-4 {
+            self.panels.header.shown(now);
+            self.bus.send(Command::Tick(dt));
+        }
+        ctx.request_repaint_after(Duration::from_secs_f64(wait));
     }
 
     /// Keys pressed, unless somebody types.
@@ -145,7 +167,7 @@ impl App {
             }
             return;
         }
-        if ctx.text_edit_focused() || self.panels.modal() {
+        if ctx.text_edit_focused() || self.panels.modal() || self.jobs.modal() {
             return;
         }
         self.clipboard(ctx);
@@ -209,8 +231,18 @@ impl App {
     fn task(&mut self, ctx: &egui::Context, task: Task) {
         match task {
             Task::ResetLayout => self.tree = layout::default_tree(),
-            Task::Open | Task::Save | Task::SaveAs | Task::Export | Task::Quit => {
+            Task::Open
+            | Task::Save
+            | Task::SaveAs
+            | Task::Export
+            | Task::Still
+            | Task::BakeXzx
+            | Task::BakeQuaternions
+            | Task::Quit => {
                 self.jobs.task(ctx, task, &mut self.state, &mut self.bus);
+            }
+            Task::FrameAll | Task::FrameSelection if self.panels.hovered == Some(Pane::Viewport) => {
+                self.viewport.task(task, &self.state);
             }
             _ => self.panels.task(task, &self.state, &mut self.bus),
         }
@@ -224,5 +256,6 @@ impl eframe::App for App {
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
         eframe::set_value(storage, KEPT, &(&self.tree, &self.state.view));
+        eframe::set_value(storage, FILES, &self.jobs.recent);
     }
 }

@@ -19,6 +19,12 @@ pub enum Task {
     SaveAs,
     /// Choose what to export.
     Export,
+    /// A picture by rays, as the viewport stands.
+    Still,
+    /// Rotations as XZX angles.
+    BakeXzx,
+    /// Rotations as quaternions.
+    BakeQuaternions,
     /// A search over every action.
     Palette,
     /// The ways that a track can run between its keys.
@@ -145,7 +151,7 @@ fn interpolate(to: Interpolation) -> Vec<Command> {
     edit(Edit::SetInterpolation(to))
 }
 
-/// Next to the playhead: a key in a direction, or where it stands.
+/// Next to the playhead: a key in a direction, or nothing. A look at every track, so it is not asked whether there is one until somebody does.
 fn to_key(s: &State, forward: bool) -> Vec<Command> {
     s.neighbour_key(forward).map(Command::SetTime).into_iter().collect()
 }
@@ -160,6 +166,7 @@ pub static ACTIONS: &[Action] = &[
     act("File", "Save", "Write the rig and its poses", with(CTRL, Key::S), Any, always, Window(Task::Save)),
     act("File", "Save as…", "Write the rig and its poses elsewhere", with(CTRL_SHIFT, Key::S), Any, always, Window(Task::SaveAs)),
     act("File", "Export…", "GLB, frames, GIF or a sheet", with(CTRL, Key::E), Any, always, Window(Task::Export)),
+    act("File", "Ray-traced still…", "What the viewport shows, by rays", None, Any, always, Window(Task::Still)),
     act("File", "Quit", "Close the window", with(CTRL, Key::Q), Any, always, Window(Task::Quit)),
     act("Edit", "Undo", "Take the last step back", with(CTRL, Key::Z), Any, |s| s.undo_name().is_some(), Do(|_| vec![Command::Undo])),
     act("Edit", "Redo", "Do the step again", with(CTRL_SHIFT, Key::Z), Any, |s| s.redo_name().is_some(), Do(|_| vec![Command::Redo])),
@@ -192,8 +199,8 @@ pub static ACTIONS: &[Action] = &[
     act("Time", "Previous frame", "The playhead a frame back", key(Key::ArrowLeft), Any, always, Do(|s| vec![Command::SetTime(s.time_of(s.frame_at(s.time - 1e-9).ceil() - 1.0))])),
     act("Time", "To the end", "The last frame of the range", with(SHIFT, Key::ArrowRight), Any, always, Do(|s| vec![Command::SetTime(s.playback.range.end)])),
     act("Time", "To the start", "The first frame of the range", with(SHIFT, Key::ArrowLeft), Any, always, Do(|s| vec![Command::SetTime(s.playback.range.start)])),
-    act("Time", "Next key", "The next key of the selected bones, or of all", key(Key::ArrowUp), Any, |s| s.neighbour_key(true).is_some(), Do(|s| to_key(s, true))),
-    act("Time", "Previous key", "The key before", key(Key::ArrowDown), Any, |s| s.neighbour_key(false).is_some(), Do(|s| to_key(s, false))),
+    act("Time", "Next key", "The next key of the selected bones, or of all", key(Key::ArrowUp), Any, always, Do(|s| to_key(s, true))),
+    act("Time", "Previous key", "The key before", key(Key::ArrowDown), Any, always, Do(|s| to_key(s, false))),
     act("Time", "Marker", "Name the moment at the playhead", key(Key::M), Any, always, Do(|s| edit(Edit::SetMarker(Marker { time: s.time, name: format!("M{}", s.active().markers.len() + 1) })))),
     act("Time", "Remove marker", "Forget the marker at the playhead", with(SHIFT, Key::M), Any, |s| s.active().markers.iter().any(|m| (m.time - s.time).abs() < 1e-6), Do(|s| edit(Edit::RemoveMarker(s.time)))),
     act("Time", "Preview from here", "What is played starts at the playhead", key(Key::OpenBracket), Any, always, Do(|s| playback(s, |p| p.range.start = s.time))),
@@ -217,6 +224,8 @@ pub static ACTIONS: &[Action] = &[
     act("Clip", "New clip", "An empty clip", None, Any, always, Do(|s| edit(Edit::NewClip(format!("clip {}", s.document.clips.len() + 1))))),
     act("Clip", "Mirror clip", "Left does what right did, by bone names", None, Any, |s| !s.active().tracks.is_empty(), Do(|_| edit(Edit::MirrorClip))),
     act("Clip", "Delete clip", "This clip", None, Any, |s| s.document.clips.len() > 1, Do(|_| edit(Edit::DeleteClip))),
+    act("Clip", "Bake to angles", "All rotations as twist, bend, twist; the error is measured", None, Any, always, Window(Task::BakeXzx)),
+    act("Clip", "Bake to quaternions", "All rotations as quaternions, as glTF has them", None, Any, always, Window(Task::BakeQuaternions)),
     act("Help", "What this pane does", "Gestures and keys of the pane under the pointer", with(SHIFT, Key::Questionmark), Any, always, Window(Task::Help)),
 ];
 

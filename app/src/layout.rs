@@ -58,6 +58,11 @@ pub fn default_tree() -> Tree<Pane> {
     Tree::new(egui::Id::unique("panes"), root, tiles)
 }
 
+/// Some room around what is read.
+fn inset(ui: &mut egui::Ui, draw: impl FnOnce(&mut egui::Ui)) {
+    egui::Frame::new().inner_margin(6.0).show(ui, draw);
+}
+
 /// Draws panes.
 pub(crate) struct Panes<'a> {
     pub state: &'a State,
@@ -68,13 +73,14 @@ pub(crate) struct Panes<'a> {
 
 impl Behavior<Pane> for Panes<'_> {
     fn pane_ui(&mut self, ui: &mut egui::Ui, _: TileId, pane: &mut Pane) -> UiResponse {
+        ui.painter().rect_filled(ui.max_rect(), 0.0, ui.visuals().panel_fill);
         if ui.rect_contains_pointer(ui.max_rect()) {
             self.panels.hovered = Some(*pane);
         }
         match pane {
             Pane::Viewport => self.viewport.ui(ui, self.state, self.bus),
-            Pane::Bones => self.panels.bones.ui(ui, self.state, self.bus),
-            Pane::Inspector => self.panels.inspector.ui(ui, self.state, self.bus),
+            Pane::Bones => inset(ui, |ui| self.panels.bones.ui(ui, self.state, self.bus)),
+            Pane::Inspector => inset(ui, |ui| self.panels.inspector.ui(ui, self.state, self.bus)),
             Pane::Dope => self.panels.dope.ui(ui, self.state, self.bus),
             Pane::Graph => self.panels.graph.ui(ui, self.state, self.bus),
         }

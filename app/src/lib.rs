@@ -10,6 +10,7 @@ pub mod jobs;
 pub mod layout;
 pub mod paint;
 pub mod panels;
+pub mod screenshot;
 pub mod state;
 pub mod viewport;
 

@@ -1,125 +1,16 @@
 //! A real session without a window: pointers, keys and names, as a person would.
 
+use super::files::{Folder, wait};
+use super::person::{CTRL, CTRL_SHIFT, Person};
 use super::pip;
-use egui::{Event, Key, Modifiers, PointerButton, Pos2, Rect, pos2};
-use egui_kittest::kittest::Queryable;
-use egui_kittest::{Harness, Node};
-use sinew::clip::{Interpolation, Target};
-use sinew_app::App;
+use egui::{Event, Key, Modifiers, PointerButton, pos2};
+use sinew::clip::Interpolation;
+use sinew::frames::View;
+use sinew::io::picture::frames_of;
+use sinew::render::Renderer;
+use sinew_app::jobs::film::Wish;
+use sinew_app::jobs::open;
 use sinew_app::state::State;
-
-const CTRL: Modifiers = Modifiers::COMMAND;
-const CTRL_SHIFT: Modifiers = Modifiers { shift: true, ..Modifiers::COMMAND };
-
-/// The editor and somebody at it.
-pub struct Person {
-    pub ui: Harness<'static, App>,
-}
-
-impl Person {
-    pub fn at(state: State) -> Self {
-        let build = Harness::builder()
-            .with_size([1440.0, 900.0])
-            .with_max_steps(64)
-            .with_context_setup(sinew_app::set_up);
-        let app = App::new(state);
-        let mut ui = build.build_ui_state(|ui, app: &mut App| app.ui(ui), app);
-        ui.run();
-        Self { ui }
-    }
-
-    pub fn state(&self) -> &State {
-        &self.ui.state().state
-    }
-
-    pub fn node<'n>(&'n self, name: &'n str) -> Node<'n> {
-        let mut found = self.ui.query_all_by_label(name);
-        let first = found.next().unwrap_or_else(|| panic!("nothing is called `{name}`"));
-        assert!(found.next().is_none(), "two things are called `{name}`");
-        first
-    }
-
-    /// Choose a bone in the tree, wherever it is scrolled to.
-    pub fn pick(&mut self, bone: &str) {
-        self.type_into("Filter of the bones", bone);
-        self.click(bone);
-    }
-
-    pub fn has(&self, name: &str) -> bool {
-        self.ui.query_all_by_label(name).next().is_some()
-    }
-
-    pub fn place(&self, name: &str) -> Rect {
-        self.node(name).rect()
-    }
-
-    pub fn click(&mut self, name: &str) {
-        let at = self.place(name).center();
-        self.press(at, PointerButton::Primary, Modifiers::NONE);
-    }
-
-    pub fn press(&mut self, at: Pos2, button: PointerButton, modifiers: Modifiers) {
-        self.ui.event(Event::PointerMoved(at));
-        self.ui.step();
-        for pressed in [true, false] {
-            self.button(at, button, pressed, modifiers);
-        }
-        self.ui.run();
-    }
-
-    pub fn button(&mut self, pos: Pos2, button: PointerButton, pressed: bool, modifiers: Modifiers) {
-        self.ui.event_modifiers(Event::PointerButton { pos, button, pressed, modifiers }, modifiers);
-        self.ui.step();
-    }
-
-    /// Press, move in steps, and let go, or leave held.
-    pub fn drag(&mut self, from: Pos2, to: Pos2, release: bool) {
-        self.ui.event(Event::PointerMoved(from));
-        self.ui.step();
-        self.button(from, PointerButton::Primary, true, Modifiers::NONE);
-        for i in 1..=5 {
-            self.ui.event(Event::PointerMoved(from + (to - from) * (i as f32 / 5.0)));
-            self.ui.step();
-        }
-        if release {
-            self.button(to, PointerButton::Primary, false, Modifiers::NONE);
-        }
-        self.ui.run_steps(3);
-    }
-
-    pub fn key(&mut self, modifiers: Modifiers, key: Key) {
-        self.ui.key_press_modifiers(modifiers, key);
-        self.ui.run_steps(2);
-    }
-
-    pub fn hover(&mut self, at: Pos2) {
-        self.ui.event(Event::PointerMoved(at));
-        self.ui.run_steps(2);
-    }
-
-    /// Click a number and type another.
-    pub fn type_into(&mut self, name: &str, text: &str) {
-        self.click(name);
-        self.key(CTRL, Key::A);
-        self.ui.event(Event::Text(text.into()));
-        self.ui.run_steps(2);
-        self.key(Modifiers::NONE, Key::Enter);
-        self.ui.run_steps(2);
-    }
-
-    pub fn times(&self, bone: &str) -> Vec<f64> {
-        let s = self.state();
-        let bone = s.document.skeleton().find(bone).expect("a bone of the rig");
-        let track = s.track_of(&Target::Xzx(bone)).expect("it is keyed");
-        let times = s.active().tracks[track].curve.times();
-        times.iter().map(|t| (s.frame_at(*t) * 1e6).round() / 1e6).collect()
-    }
-
-    pub fn menu(&mut self, menu: &str, item: &str) {
-        self.click(menu);
-        self.click(item);
-    }
-}
 
 #[test]
 fn from_the_first_bone_to_the_last_frame() {
@@ -127,6 +18,9 @@ fn from_the_first_bone_to_the_last_frame() {
     let start = p.state().document.clone();
     p.menu("Clip", "New clip");
     assert!(p.state().active().tracks.is_empty());
+    p.click("Clip to edit");
+    p.type_into("Name of this clip", "kneel");
+    assert_eq!(p.state().active().name, "kneel");
 
     // Three poses of a knee and a hip, by typed numbers.
     for (frame, bend) in [("0", "10"), ("12", "70"), ("24", "10")] {
@@ -180,6 +74,7 @@ fn from_the_first_bone_to_the_last_frame() {
     let kinds = p.state().active().tracks.iter().map(|t| t.curve.interpolation());
     assert!(kinds.into_iter().all(|k| matches!(k, Interpolation::CatmullRom(_))));
 
+    p.shot("session");
     p.menu("Clip", "Mirror clip");
     assert_eq!(p.times("shin.R"), [0.0, 30.0, 48.0]);
 
@@ -204,6 +99,52 @@ fn from_the_first_bone_to_the_last_frame() {
         p.key(CTRL_SHIFT, Key::Z);
     }
     assert!(p.state().document.same_bits(&end));
+
+    // Onto the disk and back, equal.
+    let folder = Folder::new("session");
+    let [rig, glb, gif] = ["pip.json", "pip.glb", "pip.gif"].map(|n| folder.0.join(n));
+    let ctx = p.ui.ctx.clone();
+    let app = p.ui.state_mut();
+    app.jobs.save(&ctx, rig.clone(), &app.state);
+    wait(&mut p);
+    assert!(!p.state().unsaved());
+    let again = open::read(&rig).expect("what was written").state();
+    assert_eq!(again.document.to_clips(), p.state().document.to_clips());
+
+    // And out, to whoever plays it.
+    let (clip, range) = (p.state().clip, p.state().active().range);
+    let app = p.ui.state_mut();
+    app.jobs.export_gltf(&ctx, glb.clone(), &app.state);
+    wait(&mut p);
+    let (view, renderer, rate) = (View::default(), Renderer::Raster, "6".parse().expect("a rate"));
+    let wish =
+        Wish { to: gif.clone(), sheet: false, size: [48, 40], view, renderer, rate, clip, at: 0.0, range };
+    let app = p.ui.state_mut();
+    app.jobs.export_film(&ctx, wish, &app.state);
+    wait(&mut p);
+    let import = sinew::io::import(&glb, &sinew::io::Options::default()).expect("a GLB");
+    let played = import.asset.character.clips()[clip].range();
+    assert!((played.end - 2.0).abs() < 1e-6, "{played:?}");
+    let frames = frames_of(&std::fs::read(&gif).expect("a film")).expect("a GIF").count();
+    assert_eq!(frames, 12);
+}
+
+#[test]
+fn pictures_of_every_pane() {
+    let mut p = Person::at(State::open(pip()));
+    p.shot("opened");
+    p.pick("shin.L");
+    p.type_into("Frame", "9");
+    p.menu("View", "Frame all");
+    p.shot("bone");
+    p.click("Help on Graph");
+    p.shot("help");
+    p.key(Modifiers::NONE, Key::Escape);
+    p.click("Keys");
+    p.shot("menu");
+    p.key(Modifiers::NONE, Key::Escape);
+    p.key(Modifiers::NONE, Key::T);
+    p.shot("palette");
 }
 
 #[test]

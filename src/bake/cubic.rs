@@ -1,6 +1,6 @@
 //! One track as cubics: the fewest keys with slopes of their own, or with slopes by a rule.
 
-use super::fit::{Kind, Samples};
+use super::fit::{Kind, Near, Samples};
 use crate::clip::{Curve, Interpolation};
 use crate::math::spline::{Tangents, hermite, tangent};
 use glam::Quat;
@@ -13,34 +13,37 @@ const RULE: Tangents = Tangents::Notes;
 const CHORD: f64 = 1e-6;
 
 /// Two keys and the slopes between them, component by component.
-struct Piece {
+struct Piece<'s> {
     h: f64,
-    ends: [Vec<f64>; 2],
+    ends: [&'s [f32]; 2],
     slopes: [Vec<f64>; 2],
 }
 
-impl Piece {
+impl<'s> Piece<'s> {
+    fn at(&self, u: f64, c: usize) -> f64 {
+        let [a, b] = self.ends.map(|v| v[c] as f64);
+        hermite(a, self.slopes[0][c], b, self.slopes[1][c], self.h, u)
+    }
+
     /// How far it is from a sample.
     fn off(&self, s: &Samples, i: usize, from: f64) -> f64 {
         let u = (s.times[i] - from) / self.h;
-        let value = |c: usize| {
-            hermite(self.ends[0][c], self.slopes[0][c], self.ends[1][c], self.slopes[1][c], self.h, u) as f32
-        };
-        let v: Vec<f32> = (0..s.width).map(value).collect();
+        let (at, value) = (|c: usize| self.at(u, c) as f32, s.value(i));
         match s.kind {
             Kind::Rotation => {
-                let q = crate::math::rotation::unit(Quat::from_slice(&v));
-                s.distance(&q.to_array(), s.value(i))
+                let q = crate::math::rotation::unit(Quat::from_array(std::array::from_fn(at)));
+                s.distance(&q.to_array(), value)
             }
-            _ => s.distance(&v, s.value(i)),
+            Kind::Weights => (0..s.width).map(|c| (at(c) - value[c]).abs() as f64).fold(0.0, f64::max),
+            Kind::Vector | Kind::Angles => s.distance(&std::array::from_fn::<_, 3, _>(at), value),
         }
     }
 
     /// The slopes with the least squares of errors at the samples between two.
-    fn settled(s: &Samples, [a, b]: [usize; 2]) -> Self {
+    fn settled(s: &'s Samples, [a, b]: [usize; 2]) -> Self {
         let h = s.times[b] - s.times[a];
-        let ends = [a, b].map(|i| s.value(i).iter().map(|v| *v as f64).collect::<Vec<_>>());
-        let chord = |c: usize| (ends[1][c] - ends[0][c]) / h;
+        let ends = [a, b].map(|i| s.value(i));
+        let chord = |c: usize| (ends[1][c] as f64 - ends[0][c] as f64) / h;
         let mut m = [CHORD, 0.0, CHORD];
         let mut right = vec![[0.0; 2]; s.width];
         for i in a + 1..b {
@@ -48,10 +51,9 @@ impl Piece {
             // What a unit of each slope, times h, adds here.
             let [p, q] = [u * (1.0 - u) * (1.0 - u), u * u * (u - 1.0)];
             m = [m[0] + p * p, m[1] + p * q, m[2] + q * q];
-            for c in 0..s.width {
-                let straight = hermite(ends[0][c], chord(c), ends[1][c], chord(c), h, u);
-                let r = s.value(i)[c] as f64 - straight;
-                right[c] = [right[c][0] + p * r, right[c][1] + q * r];
+            for (c, (right, v)) in right.iter_mut().zip(s.value(i)).enumerate() {
+                let r = *v as f64 - (ends[0][c] as f64 + chord(c) * h * u);
+                *right = [right[0] + p * r, right[1] + q * r];
             }
         }
         let d = m[0] * m[2] - m[1] * m[1];
@@ -65,8 +67,13 @@ impl Piece {
         Self { h, ends, slopes }
     }
 
-    fn holds(&self, s: &Samples, inner: Range<usize>, from: f64, tolerance: f64) -> bool {
-        inner.into_iter().all(|i| self.off(s, i, from) <= tolerance)
+    fn holds(&self, s: &Samples, inner: Range<usize>, from: f64, near: &Near) -> bool {
+        let mut inner = inner;
+        if s.kind == Kind::Rotation {
+            let turn = |i: usize| std::array::from_fn(|c| self.at((s.times[i] - from) / self.h, c));
+            return inner.all(|i| near.holds_turn(turn(i), s.value(i)));
+        }
+        inner.all(|i| self.off(s, i, from) <= near.tolerance)
     }
 }
 
@@ -102,10 +109,11 @@ fn push(s: &Samples, i: usize, into: &[f64], out: &[f64], times: &mut Vec<f64>, 
 }
 
 /// The last sample that a piece from `from` may end at: doubling steps, then bisection.
-fn reach(s: &Samples, from: usize, last: usize, tolerance: f64) -> (usize, Piece) {
+fn reach(s: &Samples, from: usize, last: usize, tolerance: f64) -> (usize, Piece<'_>) {
+    let near = Near::new(tolerance);
     let fits = |to: usize| {
         let piece = Piece::settled(s, [from, to]);
-        piece.holds(s, from + 1..to, s.times[from], tolerance).then_some(piece)
+        piece.holds(s, from + 1..to, s.times[from], &near).then_some(piece)
     };
     let mut good = (from + 1, Piece::settled(s, [from, from + 1]));
     let (mut step, mut bad) = (1, last + 1);
@@ -157,13 +165,14 @@ fn ruled(s: &Samples, first: usize, last: usize, tolerance: f64) -> Vec<usize> {
         keys.extend(more);
         keys.sort_unstable();
     }
+    let near_enough = Near::new(tolerance);
     let mut k = 1;
     while k + 1 < keys.len() {
         let gone = keys.remove(k);
         // Slopes change one key further than the gap.
         let near = k.saturating_sub(2)..(k + 1).min(keys.len() - 2) + 1;
         let holds = |k: usize| {
-            piece_by_rule(s, &keys, k).holds(s, keys[k] + 1..keys[k + 1], s.times[keys[k]], tolerance)
+            piece_by_rule(s, &keys, k).holds(s, keys[k] + 1..keys[k + 1], s.times[keys[k]], &near_enough)
         };
         if !near.clone().all(holds) {
             keys.insert(k, gone);
@@ -174,7 +183,7 @@ fn ruled(s: &Samples, first: usize, last: usize, tolerance: f64) -> Vec<usize> {
 }
 
 /// The piece from key `k` to the next.
-fn piece_by_rule(s: &Samples, keys: &[usize], k: usize) -> Piece {
+fn piece_by_rule<'s>(s: &'s Samples, keys: &[usize], k: usize) -> Piece<'s> {
     let at = |k: usize, c: usize| (s.times[keys[k]], s.value(keys[k])[c] as f64);
     let slope = |k: usize, c: usize| {
         let previous = k.checked_sub(1).map(|k| at(k, c));
@@ -182,7 +191,7 @@ fn piece_by_rule(s: &Samples, keys: &[usize], k: usize) -> Piece {
     };
     Piece {
         h: s.times[keys[k + 1]] - s.times[keys[k]],
-        ends: [k, k + 1].map(|k| (0..s.width).map(|c| at(k, c).1).collect()),
+        ends: [k, k + 1].map(|k| s.value(keys[k])),
         slopes: [k, k + 1].map(|k| (0..s.width).map(|c| slope(k, c)).collect()),
     }
 }

@@ -1,7 +1,7 @@
 //! One track: the fewest keys that keep every sample of it within a tolerance.
 
 use crate::clip::{Curve, Interpolation};
-use crate::math::rotation;
+use crate::math::{euler, rotation};
 use glam::{DVec3, Quat, Vec3};
 
 /// How values of a track are compared, and what of them is stored.
@@ -9,6 +9,8 @@ use glam::{DVec3, Quat, Vec3};
 pub(super) enum Kind {
     /// Unit quaternions: radians between them.
     Rotation,
+    /// XZX angles: radians that the bone turns by.
+    Angles,
     /// Vectors: their distance.
     Vector,
     /// Morph weights: the largest difference.
@@ -25,6 +27,8 @@ pub(super) struct Samples {
     pub values: Vec<f32>,
     /// The samples that were keys of the curve.
     pub own: Vec<usize>,
+    /// Those that a jump follows, ascending.
+    breaks: Vec<usize>,
 }
 
 /// Parts between two keys of a cubic, at whose ends samples are taken.
@@ -37,7 +41,8 @@ impl Samples {
     /// Of a curve: its keys, and points between them.
     pub fn of(curve: &Curve, kind: Kind) -> Self {
         let keys = curve.times();
-        let mut out = Self { kind, width: curve.width(), times: vec![], values: vec![], own: vec![] };
+        let mut out =
+            Self { kind, width: curve.width(), times: vec![], values: vec![], own: vec![], breaks: vec![] };
         let held = curve.interpolation() == Interpolation::Hold;
         for (k, &t) in keys.iter().enumerate() {
             // Of keys at one time the last holds; elsewhere the curve arrives at one and leaves from another.
@@ -57,6 +62,7 @@ impl Samples {
             }
         }
         out.align();
+        out.seal();
         out
     }
 
@@ -64,7 +70,9 @@ impl Samples {
     pub fn at_keys(self) -> Self {
         let values = self.own.iter().flat_map(|&i| self.value(i).to_vec()).collect();
         let times: Vec<f64> = self.own.iter().map(|&i| self.times[i]).collect();
-        Self { own: (0..times.len()).collect(), times, values, ..self }
+        let mut out = Self { own: (0..times.len()).collect(), times, values, ..self };
+        out.seal();
+        out
     }
 
     fn between(&mut self, curve: &Curve, from: f64, to: f64) {
@@ -124,9 +132,20 @@ impl Samples {
     pub fn distance(&self, a: &[f32], b: &[f32]) -> f64 {
         match self.kind {
             Kind::Rotation => rotation::angle_between(Quat::from_slice(a), Quat::from_slice(b)) as f64,
+            Kind::Angles => angles_apart(wide(a), wide(b)),
             Kind::Vector => wide(a).distance(wide(b)),
             Kind::Weights => a.iter().zip(b).map(|(a, b)| (a - b).abs() as f64).fold(0.0, f64::max),
         }
+    }
+
+    fn seal(&mut self) {
+        self.breaks = (0..self.len()).filter(|&i| self.jumps(i)).collect();
+    }
+
+    /// The last sample that can be reached from `i` without a jump; not `i` itself.
+    fn run_end(&self, i: usize) -> usize {
+        let next = self.breaks.partition_point(|b| *b <= i);
+        self.breaks.get(next).copied().unwrap_or(self.len() - 1)
     }
 
     /// Whether a jump lies between sample `i` and the next.
@@ -144,6 +163,11 @@ fn wide(v: &[f32]) -> DVec3 {
     Vec3::from_slice(v).as_dvec3()
 }
 
+/// Radians between triples that are near each other. Turns count, so one that is a turn off is not near.
+fn angles_apart(a: DVec3, b: DVec3) -> f64 {
+    euler::xzx_distance(a.to_array(), b.to_array())
+}
+
 /// Keys of straight pieces: of samples, with the values that are stored for them.
 pub(super) struct Pieces {
     /// Samples that became keys.
@@ -156,12 +180,20 @@ pub(super) struct Pieces {
 /// a chord errs to one side, and moving it to the middle of its error halves it.
 const WIDER: [f64; 4] = [2.0, 1.7, 1.4, 1.2];
 
+/// And where a guess will do.
+const WIDER_DRAFT: [f64; 1] = [1.7];
+
 /// Few keys whose straight pieces stay within `tolerance` of every sample; the first and the last are exact, so that loops close.
 /// `stored` is what a file will hold of a value: pieces are tried as they will be played.
-pub(super) fn fitted(s: &Samples, tolerance: f64, stored: impl Fn(&[f32]) -> Vec<f32>) -> Pieces {
-    let exact = straight(s, tolerance, &stored);
-    for wider in WIDER {
-        let mut pieces = straight(s, wider * tolerance, &stored);
+pub(super) fn fitted(
+    s: &Samples,
+    tolerance: f64,
+    draft: bool,
+    stored: impl Fn(&[f32]) -> Vec<f32>,
+) -> Pieces {
+    let exact = straight(s, &Near::new(tolerance), &stored);
+    for &wider in if draft { &WIDER_DRAFT[..] } else { &WIDER } {
+        let mut pieces = straight(s, &Near::new(wider * tolerance), &stored);
         if pieces.keys.len() < exact.keys.len() {
             settle(s, &mut pieces, &stored);
             if s.holds(&pieces, tolerance) {
@@ -174,31 +206,31 @@ pub(super) fn fitted(s: &Samples, tolerance: f64, stored: impl Fn(&[f32]) -> Vec
 
 /// How far pieces are from the samples at most.
 pub(super) fn worst(s: &Samples, p: &Pieces) -> f64 {
-    let w = s.width;
-    let piece = |(k, ends): (usize, &[usize])| {
-        let (a, b) = (&p.values[k * w..(k + 1) * w], &p.values[(k + 1) * w..(k + 2) * w]);
-        let h = s.times[ends[1]] - s.times[ends[0]];
-        let at = |i: usize| if h > 0.0 { (s.times[i] - s.times[ends[0]]) / h } else { (i - ends[0]) as f64 };
-        (ends[0]..=ends[1]).map(|i| off(s.kind, a, b, at(i) as f32, s.value(i))).fold(0.0, f64::max)
-    };
-    p.keys.windows(2).enumerate().map(piece).fold(0.0, f64::max)
+    let mut worst = 0.0_f64;
+    s.each(p, |piece, u, value| {
+        worst = worst.max(piece.off(u, value));
+        true
+    });
+    worst
 }
 
 impl Samples {
     /// Whether the pieces stay within the tolerance of every sample.
     fn holds(&self, p: &Pieces, tolerance: f64) -> bool {
+        let near = Near::new(tolerance);
+        self.each(p, |piece, u, value| near.holds(piece, u, value))
+    }
+
+    /// Go through every sample with the piece that it belongs to, until one is refused.
+    fn each<'s>(&'s self, p: &'s Pieces, mut take: impl FnMut(&Straight, f64, &'s [f32]) -> bool) -> bool {
         let w = self.width;
         p.keys.windows(2).enumerate().all(|(k, ends)| {
             let (a, b) = (&p.values[k * w..(k + 1) * w], &p.values[(k + 1) * w..(k + 2) * w]);
-            let h = self.times[ends[1]] - self.times[ends[0]];
-            (ends[0]..=ends[1]).all(|i| {
-                let u = if h > 0.0 {
-                    ((self.times[i] - self.times[ends[0]]) / h) as f32
-                } else {
-                    (i - ends[0]) as f32
-                };
-                off(self.kind, a, b, u, self.value(i)) <= tolerance
-            })
+            let piece = Straight::new(self.kind, a, b);
+            let from = self.times[ends[0]];
+            let h = self.times[ends[1]] - from;
+            let at = |i: usize| if h > 0.0 { (self.times[i] - from) / h } else { (i - ends[0]) as f64 };
+            (ends[0]..=ends[1]).all(|i| take(&piece, at(i), self.value(i)))
         })
     }
 }
@@ -271,7 +303,7 @@ fn settled(s: &Samples, keys: &[usize]) -> Vec<f32> {
 }
 
 /// The fewest keys from sample `0` to the last whose straight pieces stay within `tolerance` of every sample.
-fn straight(s: &Samples, tolerance: f64, stored: &impl Fn(&[f32]) -> Vec<f32>) -> Pieces {
+fn straight(s: &Samples, near: &Near, stored: &impl Fn(&[f32]) -> Vec<f32>) -> Pieces {
     let n = s.len();
     let mut out = Pieces { keys: vec![0], values: stored(s.value(0)) };
     let mut from = 0;
@@ -280,7 +312,7 @@ fn straight(s: &Samples, tolerance: f64, stored: &impl Fn(&[f32]) -> Vec<f32>) -
             // Two keys at one time; the piece between them has no length.
             from += 1;
         } else {
-            from = reach(s, from, tolerance, stored);
+            from = reach(s, from, near, stored);
         }
         out.keys.push(from);
         out.values.extend(stored(s.value(from)));
@@ -294,16 +326,16 @@ pub(super) fn all(s: &Samples, stored: impl Fn(&[f32]) -> Vec<f32>) -> Pieces {
 }
 
 /// The last sample that a straight piece from `from` may end at: doubling steps, then bisection.
-fn reach(s: &Samples, from: usize, tolerance: f64, stored: &impl Fn(&[f32]) -> Vec<f32>) -> usize {
+fn reach(s: &Samples, from: usize, near: &Near, stored: &impl Fn(&[f32]) -> Vec<f32>) -> usize {
     let a = stored(s.value(from));
-    let end = (from + 1..s.len()).find(|&i| s.jumps(i)).unwrap_or(s.len() - 1);
+    let end = s.run_end(from);
     let fits = |to: usize| {
         let b = stored(s.value(to));
+        let piece = Straight::new(s.kind, &a, &b);
         let h = s.times[to] - s.times[from];
-        (from + 1..to).all(|i| {
-            let u = ((s.times[i] - s.times[from]) / h) as f32;
-            off(s.kind, &a, &b, u, s.value(i)) <= tolerance
-        })
+        let holds = |i: usize| near.holds(&piece, (s.times[i] - s.times[from]) / h, s.value(i));
+        // Most pieces that are too long miss their middle.
+        to == from + 1 || (holds(from + (to - from) / 2) && (from + 1..to).all(holds))
     };
     let (mut good, mut step) = (from + 1, 1);
     let mut bad = end + 1;
@@ -322,17 +354,86 @@ fn reach(s: &Samples, from: usize, tolerance: f64, stored: &impl Fn(&[f32]) -> V
     good.min(end)
 }
 
-/// How far a straight piece from `a` to `b` is from a value at `u`.
-fn off(kind: Kind, a: &[f32], b: &[f32], u: f32, value: &[f32]) -> f64 {
-    match kind {
-        Kind::Rotation => {
-            let q = rotation::slerp(Quat::from_slice(a), Quat::from_slice(b), u);
-            rotation::angle_between(q, Quat::from_slice(value)) as f64
+/// A straight piece between two values.
+pub(super) struct Straight<'v> {
+    kind: Kind,
+    a: &'v [f32],
+    b: &'v [f32],
+    /// Of quaternions: half the angle between them, and the sign that brings them together.
+    theta: f64,
+    sign: f64,
+}
+
+impl<'v> Straight<'v> {
+    pub fn new(kind: Kind, a: &'v [f32], b: &'v [f32]) -> Self {
+        let mut out = Self { kind, a, b, theta: 0.0, sign: 1.0 };
+        if kind == Kind::Rotation {
+            let [p, q] = [a, b].map(|v| Quat::from_slice(v).as_dquat());
+            out.sign = if p.dot(q) < 0.0 { -1.0 } else { 1.0 };
+            out.theta = 2.0 * (p - q * out.sign).length().atan2((p + q * out.sign).length());
         }
-        Kind::Vector => wide(a).lerp(wide(b), u as f64).distance(wide(value)),
-        Kind::Weights => {
-            let each = a.iter().zip(b).zip(value).map(|((a, b), v)| (a + (b - a) * u - v).abs() as f64);
-            each.fold(0.0, f64::max)
+        out
+    }
+
+    /// Shoemake's slerp, not normalised.
+    fn arc(&self, u: f64) -> [f64; 4] {
+        let part = |u: f64| {
+            // sin(uθ)/sin θ by its series: the next term is below 1e-8 here.
+            if self.theta > 0.25 {
+                return (u * self.theta).sin() / self.theta.sin().max(1e-9);
+            }
+            let (t, u2) = (self.theta * self.theta, u * u);
+            let third = (31.0 + u2 * (-49.0 + u2 * (21.0 - 3.0 * u2))) / 15120.0;
+            u * (1.0 + t * ((1.0 - u2) / 6.0 + t * ((7.0 + u2 * (-10.0 + 3.0 * u2)) / 360.0 + t * third)))
+        };
+        let [p, q] = [part(1.0 - u), self.sign * part(u)];
+        std::array::from_fn(|c| p * self.a[c] as f64 + q * self.b[c] as f64)
+    }
+
+    /// How far it is from a value at `u`: radians, or the unit of the values.
+    fn off(&self, u: f64, value: &[f32]) -> f64 {
+        let (a, b) = (self.a, self.b);
+        match self.kind {
+            Kind::Rotation => 4.0 * (0.5 * chord2(self.arc(u), value).sqrt()).min(1.0).asin(),
+            Kind::Angles => angles_apart(wide(a).lerp(wide(b), u), wide(value)),
+            Kind::Vector => wide(a).lerp(wide(b), u).distance(wide(value)),
+            Kind::Weights => {
+                let each = a.iter().zip(b).zip(value);
+                each.map(|((a, b), v)| (a + (b - a) * u as f32 - v).abs() as f64).fold(0.0, f64::max)
+            }
         }
+    }
+}
+
+/// The chord between a quaternion, once it is of unit length, and one of the nearer of a unit one's two signs, squared.
+fn chord2(q: [f64; 4], value: &[f32]) -> f64 {
+    let scale = q.iter().map(|c| c * c).sum::<f64>().sqrt().max(1e-30).recip();
+    let dot: f64 = (0..4).map(|c| q[c] * value[c] as f64).sum();
+    let scale = if dot < 0.0 { -scale } else { scale };
+    (0..4).map(|c| (q[c] * scale - value[c] as f64).powi(2)).sum()
+}
+
+/// What is near enough.
+pub(super) struct Near {
+    pub tolerance: f64,
+    /// Of quaternions, the chord that belongs to it, squared.
+    chord2: f64,
+}
+
+impl Near {
+    pub fn new(tolerance: f64) -> Self {
+        Self { tolerance, chord2: (2.0 * (0.25 * tolerance.min(std::f64::consts::PI)).sin()).powi(2) }
+    }
+
+    fn holds(&self, piece: &Straight, u: f64, value: &[f32]) -> bool {
+        match piece.kind {
+            Kind::Rotation => self.holds_turn(piece.arc(u), value),
+            _ => piece.off(u, value) <= self.tolerance,
+        }
+    }
+
+    /// A quaternion of any length against a unit one.
+    pub fn holds_turn(&self, q: [f64; 4], value: &[f32]) -> bool {
+        chord2(q, value) <= self.chord2
     }
 }

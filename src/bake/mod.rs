@@ -12,6 +12,7 @@ mod gauge;
 pub mod influences;
 mod pack;
 mod plan;
+pub mod retarget;
 #[cfg(test)]
 mod tests;
 mod times;
@@ -223,9 +224,20 @@ pub fn bake_watched(
     watch: Watch,
 ) -> Result<Baked, BakeError> {
     check(character, clip, desc)?;
-    let mut gauge = Gauge::of(character, desc).watched(watch);
     let start = start(clip, desc, desc.fps)?;
-    let mut plan = Plan::new(character, clip, &start, &gauge, desc);
+    bake_from(character, clip, &start, desc, watch)
+}
+
+/// With keys chosen from those of `start`.
+fn bake_from(
+    character: &Character,
+    clip: &Clip,
+    start: &Clip,
+    desc: &BakeDesc,
+    watch: Watch,
+) -> Result<Baked, BakeError> {
+    let mut gauge = Gauge::of(character, desc).watched(watch);
+    let mut plan = Plan::new(character, clip, start, &gauge, desc);
     gauge.enter(Stage::Search);
     let mut baked = plan.search(&gauge);
     gauge.enter(Stage::Check);
@@ -238,7 +250,7 @@ pub fn bake_watched(
         }
         // What hid between the moments of the search: aim a little lower.
         let over = if worst.share() > 1.0 { worst.share() } else { ceiling };
-        baked = plan.within((0.95 / over).min(0.9));
+        baked = plan.within(&gauge, (0.95 / over).min(0.9));
     }
     let plain = plan.untouched();
     let Verdict { worst, ceiling, moments } = times::verify(&gauge, clip, &plain.clip);

@@ -65,7 +65,7 @@ impl<'a> Plan<'a> {
                     rest.locals[b.index()].translation.to_array().to_vec(),
                 ),
                 Target::Scale(b) => (Kind::Vector, at(b), rest.locals[b.index()].scale.to_array().to_vec()),
-                Target::Xzx(b) => (Kind::Vector, at(b), vec![0.0; 3]),
+                Target::Xzx(b) => (Kind::Angles, at(b), vec![0.0; 3]),
                 Target::Weights { first } => {
                     let run = first..first + track.curve.width();
                     let reach = targets[run.clone()].iter().sum::<f64>().max(1e-9);
@@ -98,7 +98,7 @@ impl<'a> Plan<'a> {
         let mut best = 0.0;
         let (mut low, mut high) = (1e-4, f64::INFINITY);
         for _ in 0..14 {
-            self.make_all();
+            self.make_all(gauge, true);
             let error = gauge.worst_of(&looks, &self.assemble()).share();
             if error <= aim {
                 (best, low) = (self.share, self.share);
@@ -119,7 +119,15 @@ impl<'a> Plan<'a> {
             };
         }
         self.share = best;
-        self.make_all();
+        for _ in 0..6 {
+            self.make_all(gauge, false);
+            let error = gauge.worst_of(&looks, &self.assemble()).share();
+            if error <= aim {
+                break;
+            }
+            // Drafts make a little less of what they are allowed.
+            self.share *= 0.99 * aim / error;
+        }
         self.widen(gauge, &looks, aim);
         self.finish()
     }
@@ -138,7 +146,7 @@ impl<'a> Plan<'a> {
                 }
                 let kept = (self.jobs[i].weight, self.jobs[i].made.clone());
                 self.jobs[i].weight *= factor;
-                self.make(i);
+                self.jobs[i].made = self.made(i, false);
                 if self.jobs[i].keys() < before {
                     work -= 1;
                     if !gauge.strays(looks, &self.assemble(), aim) {
@@ -151,9 +159,9 @@ impl<'a> Plan<'a> {
     }
 
     /// With a part of the shares.
-    pub fn within(&mut self, part: f64) -> Baked {
+    pub fn within(&mut self, gauge: &Gauge, part: f64) -> Baked {
         self.share *= part;
-        self.make_all();
+        self.make_all(gauge, false);
         self.finish()
     }
 
@@ -165,14 +173,16 @@ impl<'a> Plan<'a> {
         self.finish()
     }
 
-    fn make_all(&mut self) {
-        (0..self.jobs.len()).for_each(|i| self.make(i));
+    fn make_all(&mut self, gauge: &Gauge, draft: bool) {
+        let all: Vec<usize> = (0..self.jobs.len()).collect();
+        let made = gauge.map(&all, |i| self.made(i, draft));
+        self.jobs.iter_mut().zip(made).for_each(|(job, made)| job.made = made);
     }
 
-    fn make(&mut self, i: usize) {
-        let job = &mut self.jobs[i];
+    fn made(&self, i: usize, draft: bool) -> Option<(Curve, bool)> {
+        let job = &self.jobs[i];
         let allowed = self.share * job.weight * self.desc.tolerance / job.lever;
-        job.made = job.reduced(allowed, &self.desc);
+        job.reduced(allowed, &self.desc, draft)
     }
 
     fn assemble(&self) -> Clip {
@@ -258,7 +268,7 @@ impl Job {
     }
 
     /// The fewest keys within `allowed`, and whether they are 16-bit integers.
-    fn reduced(&self, allowed: f64, desc: &BakeDesc) -> Option<(Curve, bool)> {
+    fn reduced(&self, allowed: f64, desc: &BakeDesc, draft: bool) -> Option<(Curve, bool)> {
         let (s, quantize, goal) = (&self.samples, desc.quantize, desc.goal);
         if s.is_constant(&self.rest, allowed) {
             return None;
@@ -286,7 +296,7 @@ impl Job {
             return Some((self.steps(allowed, stored), short));
         }
         let own = [Interpolation::Linear, Interpolation::Hermite].contains(&self.source.interpolation());
-        let pieces = fit::fitted(s, allowed, stored);
+        let pieces = fit::fitted(s, allowed, draft, stored);
         let mut best = (self.straight(&pieces), short);
         let mut others = vec![];
         // Keys that stay where all of them were share their times with other tracks.
@@ -295,8 +305,8 @@ impl Job {
         } else if own || goal == Goal::Keys {
             others.push((self.source.clone(), false));
         }
-        // No cubic is smaller than three straight pieces.
-        if pieces.keys.len() > 4 {
+        // No cubic is smaller than three straight pieces, and for a draft both cost the same error.
+        if pieces.keys.len() > 4 && !draft {
             if goal == Goal::Keys {
                 others.push((cubic::by_rule(s, allowed), false));
             }

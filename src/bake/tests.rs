@@ -54,12 +54,12 @@ fn curve(seed: u64, width: usize, scale: f32, near: f32, other: &mut Rng) -> Cur
         Interpolation::Linear,
     ];
     let mut kind = kinds[(rng.next() % 5) as usize];
-    if near > 0.0 && kind == Interpolation::Linear && other.next() % 4 == 0 {
+    if near > 0.0 && kind == Interpolation::Linear && other.next().is_multiple_of(4) {
         kind = Interpolation::CatmullRom(Tangents::Monotone);
     }
     let n = 3 + rng.next() as usize % 4;
     let mut times: Vec<f64> = (0..n).map(|k| 0.3 * k as f64 + rng.range(0.0, 0.2)).collect();
-    if rng.next() % 3 == 0 {
+    if rng.next().is_multiple_of(3) {
         times[2] = times[1];
     }
     let each = if kind == Interpolation::Hermite { 3 * width } else { width };

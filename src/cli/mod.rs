@@ -45,7 +45,7 @@ enum Command {
     /// Draw a character: one picture, a numbered sequence or a film.
     Render(Box<render::Args>),
     /// Make a file's clips small within an error that you choose.
-    Bake(bake::Args),
+    Bake(Box<bake::Args>),
     /// Tell what is in a file: bones, meshes, clips, extensions, warnings.
     Info(info::Args),
     /// Print node matrices and vertex positions as JSON.

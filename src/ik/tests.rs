@@ -13,7 +13,7 @@ fn quat(rng: &mut Rng) -> Quat {
 fn arm(rng: &mut Rng, n: usize, limited: usize, scaled: bool) -> Skeleton {
     let bone = |i: usize| {
         let wide = rng.point(1.5).abs() + 0.2;
-        let limits = (limited > 0 && i % limited == 0).then_some(Limits { min: -wide, max: wide });
+        let limits = (limited > 0 && i.is_multiple_of(limited)).then_some(Limits { min: -wide, max: wide });
         let scale = if scaled { Vec3::ONE + rng.point(0.3) } else { Vec3::ONE };
         let rest = Trs { translation: rng.point(0.5), rotation: quat(rng), scale };
         let desc = BoneDesc::new(format!("{i}"));

@@ -130,6 +130,15 @@ pub fn nearest_xzx(q: DQuat, previous: [f64; 3], slack: f64) -> [[f64; 3]; 4] {
     all
 }
 
+/// How far a bone turns between two triples, radians, to first order in their difference: whole turns count.
+///
+/// With σ = θ₁+θ₃ and δ = θ₃−θ₁ the speed of a turn is `ω² = σ'²·cos²(θ₂/2) + δ'²·sin²(θ₂/2) + θ₂'²`: near rest δ costs nothing.
+pub fn xzx_distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let [d1, d2, d3] = [0, 1, 2].map(|k| b[k] - a[k]);
+    let (s, c) = (0.25 * (a[1] + b[1])).sin_cos();
+    ((d1 + d3).powi(2) * c * c + (d3 - d1).powi(2) * s * s + d2 * d2).sqrt()
+}
+
 /// `angle` plus the whole turns that bring it within half a turn of `reference`.
 fn near(angle: f64, reference: f64) -> f64 {
     angle - TAU * ((angle - reference) / TAU).round()
@@ -228,6 +237,18 @@ mod tests {
             let [d, s] = [t[2] - t[0] - prev[2] + prev[0], t[2] + t[0] - prev[2] - prev[0]];
             assert!(d.abs().min(s.abs()) < 1e-9, "{t:?} after {prev:?}");
         }
+    }
+
+    #[test]
+    fn the_distance_is_the_angle_where_triples_are_near() {
+        let mut rng = crate::test_rng::Rng::new(6);
+        for _ in 0..5000 {
+            let a = [0; 3].map(|_| rng.range(-4.0, 4.0));
+            let b = a.map(|x| x + rng.range(-1e-4, 1e-4));
+            let d = angle64(rotation_from_xzx_f64(a), rotation_from_xzx_f64(b));
+            assert!((xzx_distance(a, b) - d).abs() < 1e-8, "{} {d}", xzx_distance(a, b));
+        }
+        assert!(xzx_distance([0.0; 3], [TAU, 0.0, 0.0]) > 6.0);
     }
 
     #[test]

@@ -263,7 +263,8 @@ pub(crate) mod tests {
     /// Hips, a spine, two legs and two arms of two bones: symmetric in x, every frame turned as it likes; with `plain`, bones
     /// run along each other's images.
     pub(crate) fn body(rng: &mut Rng, plain: bool) -> Skeleton {
-        let heads: [(Option<usize>, &str, [f32; 3], [f32; 3]); 10] = [
+        type Row = (Option<usize>, &'static str, [f32; 3], [f32; 3]);
+        let heads: [Row; 10] = [
             (None, "hips", [0.0, 1.0, 0.0], [0.0, 1.2, 0.0]),
             (Some(0), "spine", [0.0, 1.2, 0.0], [0.0, 1.5, 0.1]),
             (Some(1), "arm.L", [0.2, 1.5, 0.0], [0.5, 1.4, 0.1]),
@@ -276,7 +277,7 @@ pub(crate) mod tests {
             (Some(8), "shin.R", [-0.1, 0.5, 0.1], [-0.1, 0.0, 0.0]),
         ];
         let world: Vec<(Quat, Vec3)> = heads.iter().map(|h| (turn(rng), Vec3::from(h.2))).collect();
-        let bone = |(i, h): (usize, &(Option<usize>, &str, [f32; 3], [f32; 3]))| {
+        let bone = |(i, h): (usize, &Row)| {
             let (turned, at) = world[i];
             let (up, origin) = h.0.map_or((Quat::IDENTITY, Vec3::ZERO), |p| world[p]);
             let along = Vec3::from(h.3) - at;

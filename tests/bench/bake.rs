@@ -85,8 +85,10 @@ fn breakdown(file: &Path) {
             }
             (s.1, s.2) = (stage, Instant::now());
         };
-        *spent.lock().expect("one thread") =
-            (spent.lock().expect("one thread").0, Stage::Levers, Instant::now());
+        {
+            let mut s = spent.lock().expect("one thread");
+            (s.1, s.2) = (Stage::Levers, Instant::now());
+        }
         let baked =
             bake_watched(character, clip, &desc, &|stage, _| enter(stage)).expect("a bound that holds");
         enter(Stage::Levers);
@@ -114,11 +116,11 @@ fn figure(bones: usize, vertices: usize, keys: usize) -> Vec<u8> {
     let floats = |v: &[f32]| v.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
     let typed = |n: usize, kind: &str| json!({"componentType": 5126, "count": n, "type": kind});
     // A spine with limbs of eight bones, 12 cm each.
-    let parent = |b: usize| if b % 8 == 0 { b.checked_sub(8) } else { Some(b - 1) };
+    let parent = |b: usize| if b.is_multiple_of(8) { b.checked_sub(8) } else { Some(b - 1) };
     let offset = |b: usize| {
         if b == 0 {
             [0.0, 1.0, 0.0]
-        } else if b % 8 == 0 {
+        } else if b.is_multiple_of(8) {
             [0.0, 0.12, 0.0]
         } else {
             [0.12, 0.0, 0.0]

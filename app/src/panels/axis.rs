@@ -1,7 +1,7 @@
 //! Time along a pane: where a second is, the ruler, zoom and pan, the playhead.
 
 use crate::Bus;
-use crate::state::{Command, State, View};
+use crate::state::{Command, Edit, Marker, State, View};
 use egui::{Align2, Color32, FontId, PointerButton, Pos2, Rect, Sense, Stroke, Vec2, pos2};
 
 /// Height of the ruler, points.
@@ -156,7 +156,7 @@ pub fn ruler(ui: &mut egui::Ui, axis: &Axis, name: &str, state: &State, bus: &mu
             );
         }
     }
-    markers(ui, &painter, rect, axis, state, bus);
+    markers(ui, &painter, rect, axis, name, state, bus);
     head(&painter, rect, axis, state);
 }
 
@@ -167,7 +167,15 @@ fn band(painter: &egui::Painter, rect: Rect, axis: &Axis, from: f64, to: f64, co
     }
 }
 
-fn markers(ui: &egui::Ui, painter: &egui::Painter, rect: Rect, axis: &Axis, state: &State, bus: &mut Bus) {
+fn markers(
+    ui: &egui::Ui,
+    painter: &egui::Painter,
+    rect: Rect,
+    axis: &Axis,
+    ruler: &str,
+    state: &State,
+    bus: &mut Bus,
+) {
     let green = Color32::from_rgb(120, 210, 120);
     for (i, marker) in state.active().markers.iter().enumerate() {
         let x = axis.x(marker.time);
@@ -176,11 +184,12 @@ fn markers(ui: &egui::Ui, painter: &egui::Painter, rect: Rect, axis: &Axis, stat
         }
         let hit = Rect::from_center_size(pos2(x, rect.bottom() - 7.0), Vec2::splat(14.0));
         let response = ui.interact(hit, ui.scope_id().with(("marker", i)), Sense::click());
-        let name = format!("marker {}", marker.name);
+        let name = format!("{ruler}: {}", marker.name);
         response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Button, true, &name));
         if response.clicked() {
             bus.send(Command::SetTime(marker.time));
         }
+        response.context_menu(|ui| marker_menu(ui, marker, bus));
         let tip = pos2(x, rect.bottom());
         let up = [tip, tip + Vec2::new(-4.0, -7.0), tip + Vec2::new(4.0, -7.0)];
         painter.add(egui::Shape::convex_polygon(up.to_vec(), green, Stroke::NONE));
@@ -191,6 +200,22 @@ fn markers(ui: &egui::Ui, painter: &egui::Painter, rect: Rect, axis: &Axis, stat
             FontId::proportional(10.0),
             green,
         );
+    }
+}
+
+/// Another name, or none.
+fn marker_menu(ui: &mut egui::Ui, marker: &Marker, bus: &mut Bus) {
+    let name = super::parts::name(ui, "Name of the marker", &marker.name);
+    let gone = ui.button("Remove marker").clicked();
+    if gone {
+        bus.send(Command::Do(Edit::RemoveMarker(marker.time)));
+    }
+    let done = name.is_some();
+    name.into_iter().for_each(|name| {
+        bus.send(Command::Do(Edit::SetMarker(Marker { name, ..marker.clone() })));
+    });
+    if done || gone {
+        ui.close();
     }
 }
 

@@ -1,6 +1,6 @@
 //! The tree of bones; rows that can be seen, whatever is there.
 
-use super::dope::menu;
+use super::parts::menu;
 use crate::Bus;
 use crate::state::{Command, Mode, State};
 use egui::{Align2, Color32, FontId, Rect, Sense, Stroke, Vec2, pos2};
@@ -38,11 +38,12 @@ impl Bones {
             }
         }
         ui.spacing_mut().item_spacing.y = 0.0;
-        let keyed: BTreeSet<BoneId> = state.active().tracks.iter().filter_map(|t| t.target.bone()).collect();
+        let mut keyed = vec![false; state.document.skeleton().len()];
+        state.active().tracks.iter().filter_map(|t| t.target.bone()).for_each(|b| keyed[b.index()] = true);
         scroll.show_rows(ui, ROW, rows.len(), |ui, seen| {
             for row in seen {
                 let (bone, depth) = rows[row];
-                self.row(ui, &rows, row, bone, depth, keyed.contains(&bone), state, bus);
+                self.row(ui, &rows, row, bone, depth, keyed[bone.index()], state, bus);
             }
         });
     }
@@ -113,7 +114,8 @@ impl Bones {
         let loose = state.loose.contains_key(&bone);
         let color = if loose { Color32::from_rgb(255, 150, 60) } else { visuals.text_color() };
         let at = pos2(left + 14.0, rect.center().y);
-        ui.painter().text(at, Align2::LEFT_CENTER, name, FontId::proportional(12.5), color);
+        let names = ui.painter_at(rect.with_max_x(rect.right() - 18.0));
+        names.text(at, Align2::LEFT_CENTER, name, FontId::proportional(12.5), color);
         if keyed {
             let mut mesh = egui::Mesh::default();
             super::axis::diamond(

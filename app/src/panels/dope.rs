@@ -3,9 +3,10 @@
 
 use super::axis::{self, Axis, RULER, SELECTED};
 use super::grip::{Drag, Grip};
+use super::parts::{Names, menu};
 use super::summary::Summary;
 use crate::Bus;
-use crate::commands::{ACTIONS, Task};
+use crate::commands::Task;
 use crate::state::document::track_name;
 use crate::state::{Command, EditClip, Keys, Mode, Selection, Spans, State, TrackKeys};
 use egui::{Align2, Color32, FontId, PointerButton, Pos2, Rect, Sense, Stroke, Vec2, pos2};
@@ -82,12 +83,21 @@ fn blocks(axis: &Axis, times: &[f64]) -> Vec<Block> {
     let seen = axis.visible(times);
     let (mut out, mut k) = (Vec::new(), seen.start);
     while k < seen.end {
-        let limit = times[k] + APART * axis.scale;
-        let end = k + 1 + times[k + 1..seen.end].partition_point(|&t| t < limit);
+        let end = first_from(times, k + 1, seen.end, times[k] + APART * axis.scale);
         out.push(Block { keys: k..end, from: axis.x(times[k]), to: axis.x(times[end - 1]) });
         k = end;
     }
     out
+}
+
+/// The first key in `from..end` at `limit` or later: by strides that double, since it is near.
+fn first_from(times: &[f64], from: usize, end: usize, limit: f64) -> usize {
+    let (mut low, mut stride) = (from, 1);
+    while low + stride < end && times[low + stride] < limit {
+        low += stride;
+        stride *= 2;
+    }
+    low + times[low..end.min(low + stride + 1)].partition_point(|&t| t < limit)
 }
 
 impl Dope {
@@ -379,39 +389,6 @@ impl Dope {
             say("No keys yet: pose a bone, then press I over the viewport or here");
         } else if self.rows.tracks.is_empty() {
             say("No track matches: clear the filter, or show more than the selected bones");
-        }
-    }
-}
-
-/// Key nodes for assistive technology and for tests: there where somebody listens, of keys that can be seen.
-pub(super) struct Names<'a>(pub &'a egui::Ui);
-
-impl Names<'_> {
-    pub fn add(&mut self, at: Pos2, name: impl Fn() -> String) {
-        let ui = self.0;
-        if !ui.ctx().has_accesskit_node(ui.scope_id().with("dope"))
-            && !ui.ctx().has_accesskit_node(ui.scope_id().with("graph"))
-        {
-            return;
-        }
-        let name = name();
-        let rect = Rect::from_center_size(at, Vec2::splat(2.0 * axis::HIT));
-        let response = ui.interact(rect, ui.scope_id().with(("key", &name)), Sense::hover());
-        response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Button, true, &name));
-    }
-}
-
-/// Actions of some menus, at the pointer.
-pub(super) fn menu(ui: &mut egui::Ui, of: &[&str], state: &State, bus: &mut Bus) {
-    for action in ACTIONS.iter().filter(|a| of.contains(&a.menu)) {
-        let mut button = egui::Button::new(action.name);
-        if let Some(keys) = action.shortcut {
-            button = button.shortcut_text(ui.ctx().format_shortcut(&keys));
-        }
-        let response = ui.add_enabled((action.enabled)(state), button).on_hover_text(action.help);
-        if response.accessible_name(action.name).clicked() {
-            bus.run(action, state);
-            ui.close();
         }
     }
 }

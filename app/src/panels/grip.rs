@@ -90,6 +90,11 @@ impl Grip {
             Drag::Modal { task, from, unit } => (task, from, unit, true),
             _ => return false,
         };
+        // Cancelled while the pointer was elsewhere.
+        if !state.in_gesture() {
+            self.drag = Drag::None;
+            return true;
+        }
         let (cancel, x, y, enter) = ui.input(|i| {
             let pressed = |k| i.key_pressed(k);
             let other = i.pointer.button_pressed(PointerButton::Secondary);

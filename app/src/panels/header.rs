@@ -1,5 +1,6 @@
 //! Menus; and time: transport, frame, rate, range, speed, automatic keys.
 
+use super::parts::{button, gesture};
 use crate::Bus;
 use crate::commands::{ACTIONS, MENUS, named};
 use crate::state::{Command, Edit, LoopMode, Playback, State};
@@ -49,11 +50,8 @@ impl Header {
         rate(ui, state, bus);
         speed(ui, state, bus);
         if playing {
-            self.measure(ui.input(|i| i.time));
             let text = format!("{:.1} frames/s", self.rate);
             ui.label(text).on_hover_text("Frames shown each second");
-        } else {
-            self.shown_at = None;
         }
     }
 
@@ -87,22 +85,23 @@ impl Header {
         }
     }
 
-    /// Whether the next frame is to be shown when each is.
-    pub(crate) fn due(&self, now: f64, frame: f64) -> bool {
-        self.wait(now, frame) <= 1e-4
-    }
-
-    /// Seconds until it is.
+    /// Seconds until the next frame is due, where each is shown.
     pub(crate) fn wait(&self, now: f64, frame: f64) -> f64 {
         self.shown_at.map_or(0.0, |at| (at + frame - now).max(0.0))
     }
 
-    fn measure(&mut self, now: f64) {
+    /// A frame of the clip was shown.
+    pub(crate) fn shown(&mut self, now: f64) {
         if let Some(dt) = self.shown_at.map(|at| now - at).filter(|dt| *dt > 0.0) {
             let rate = 1.0 / dt;
             self.rate = if self.rate > 0.0 { self.rate * 0.9 + rate * 0.1 } else { rate };
         }
         self.shown_at = Some(now);
+    }
+
+    /// Nothing plays.
+    pub(crate) fn stopped(&mut self) {
+        (self.shown_at, self.rate) = (None, 0.0);
     }
 }
 
@@ -125,37 +124,21 @@ fn menu_items(ui: &mut egui::Ui, menu: &str, state: &State, bus: &mut Bus) {
     }
 }
 
-/// A button that does an action; its name and help are the action's.
-pub fn button(ui: &mut egui::Ui, text: &str, name: &str, state: &State, bus: &mut Bus) {
-    let action = named(name);
-    let keys = action.shortcut.map_or(String::new(), |s| format!(" ({})", ui.ctx().format_shortcut(&s)));
-    let response = ui.add_enabled((action.enabled)(state), egui::Button::new(text));
-    if response.on_hover_text(format!("{}{keys}", action.help)).accessible_name(name).clicked() {
-        bus.run(action, state);
-    }
-}
-
-/// A number that is dragged or typed: a drag is one gesture, a typed number one edit.
-pub fn gesture(r: &egui::Response, name: &'static str, edit: Edit, state: &State, bus: &mut Bus) {
-    if r.drag_started() {
-        bus.send(Command::Begin(name));
-    }
-    if r.changed() {
-        let dragging = r.dragged() || state.in_gesture();
-        bus.send(if dragging { Command::Preview(edit) } else { Command::Do(edit) });
-    }
-    if r.drag_stopped() {
-        bus.send(Command::Commit);
-    }
-}
-
 fn clips(ui: &mut egui::Ui, state: &State, bus: &mut Bus) {
-    let combo = egui::ComboBox::from_id_salt("clip").selected_text(&state.active().name);
+    let combo = egui::ComboBox::from_id_salt("clip")
+        .close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside)
+        .selected_text(&state.active().name);
     let shown = combo.show_ui(ui, |ui| {
         for (i, clip) in state.document.clips.iter().enumerate() {
             if ui.selectable_label(i == state.clip, &clip.name).clicked() {
                 bus.send(Command::SelectClip(i));
+                ui.close();
             }
+        }
+        ui.separator();
+        if let Some(name) = super::parts::name(ui, "Name of this clip", &state.active().name) {
+            bus.send(Command::Do(Edit::RenameClip(name)));
+            ui.close();
         }
     });
     shown.response.on_hover_text("The clip that is edited").accessible_name("Clip to edit");

@@ -9,11 +9,13 @@ pub fn gestures(of: Pane) -> &'static [(&'static str, &'static str)] {
         Pane::Viewport => &[
             ("Click", "select a bone"),
             ("Shift + click", "one more or less"),
-            ("Drag a ring", "twist, bend, twist, or turn freely"),
+            ("Drag a ring", "twist, bend, twist, or turn freely; Ctrl goes by 5°"),
+            ("Drag an arrow", "move a root, or a bone with keys of its place"),
             ("Drag the end of a chain", "pull the chain"),
-            ("Middle drag", "look around"),
-            ("Shift + middle drag", "move sideways"),
-            ("Wheel", "nearer and further"),
+            ("Middle drag, or on empty ground", "look around"),
+            ("Shift + middle drag, right drag", "move sideways"),
+            ("Wheel", "nearer and further, at the pointer"),
+            ("Home, .", "look at all, or at the selected bones"),
             ("Esc", "cancel the drag"),
         ],
         Pane::Bones => &[
@@ -54,7 +56,11 @@ pub fn gestures(of: Pane) -> &'static [(&'static str, &'static str)] {
 pub fn ui(ctx: &egui::Context, pane: Pane) -> bool {
     let mut open = true;
     let title = format!("{}: gestures and keys", pane.title());
-    let window = egui::Window::new(title).open(&mut open).collapsible(false).resizable(false);
+    let window = egui::Window::new(title)
+        .open(&mut open)
+        .collapsible(false)
+        .resizable(false)
+        .anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0]);
     window.show(ctx, |ui| {
         egui::Grid::new("gestures").num_columns(2).striped(true).show(ui, |ui| {
             for (gesture, what) in gestures(pane) {

@@ -1,6 +1,6 @@
 //! Numbers of the bone that was chosen last: its angles within their limits, its place, its keys.
 
-use super::header::gesture;
+use super::parts::{button, gesture};
 use crate::Bus;
 use crate::commands::named;
 use crate::state::{Change, Command, Edit, Mode, Spans, State, TrackKeys};
@@ -63,7 +63,7 @@ fn head(ui: &mut egui::Ui, bone: BoneId, state: &State, bus: &mut Bus) {
             ("Paste", "Paste pose"),
             ("Mirror", "Paste mirrored pose"),
         ] {
-            super::header::button(ui, text, name, state, bus);
+            button(ui, text, name, state, bus);
         }
     });
     if state.loose.contains_key(&bone) {
@@ -142,7 +142,7 @@ fn bar(ui: &mut egui::Ui, value: f32, (low, high): (f32, f32)) {
 }
 
 fn quaternion(ui: &mut egui::Ui, bone: BoneId, state: &State) {
-    let q = state.pose().locals[bone.index()].rotation;
+    let q = state.pose_of_bone(bone).locals[bone.index()].rotation;
     let keyed = state.track_of(&Target::Rotation(bone)).is_some();
     let what = if keyed { "quaternion keys" } else { "as a quaternion" };
     ui.weak(format!("{what}: {:.4} {:.4} {:.4} {:.4}", q.x, q.y, q.z, q.w))
@@ -151,7 +151,7 @@ fn quaternion(ui: &mut egui::Ui, bone: BoneId, state: &State) {
 
 fn vectors(ui: &mut egui::Ui, bone: BoneId, state: &State, bus: &mut Bus) {
     let skeleton = state.document.skeleton();
-    let local = state.pose().locals[bone.index()];
+    let local = state.pose_of_bone(bone).locals[bone.index()];
     let mut one = |ui: &mut egui::Ui,
                    title: &str,
                    now: Vec3,

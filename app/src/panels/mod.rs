@@ -9,6 +9,7 @@ pub mod header;
 mod help;
 pub mod inspector;
 pub mod palette;
+pub mod parts;
 pub mod status;
 pub mod summary;
 pub mod toasts;

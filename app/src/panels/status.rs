@@ -37,9 +37,9 @@ impl Status {
 fn quality(ui: &mut egui::Ui, state: &State, bus: &mut Bus) {
     let mut quality = state.view.quality;
     for (value, name, help) in [
-        (Quality::Draft, "draft", "Half the pixels each way, plain light: fastest"),
-        (Quality::Normal, "normal", "Every pixel, as while working"),
-        (Quality::Exact, "exact", "As an export draws it: edges smoothed, all lamps; slowest"),
+        (Quality::Draft, "draft", "Half the pixels each way, one sample each: fastest"),
+        (Quality::Normal, "normal", "Every pixel; four samples each at rest, one while anything moves"),
+        (Quality::Exact, "exact", "Four samples a pixel at every moment, as an export draws it: slowest"),
     ] {
         ui.selectable_value(&mut quality, value, name).on_hover_text(help);
     }

@@ -206,7 +206,7 @@ impl State {
         if !marker.time.is_finite() {
             return Err(Refused::Bad("a marker needs a finite time".into()));
         }
-        let marker = Marker { time: self.key_time(marker.time), ..marker };
+        let marker = Marker { time: marker.time.clamp(-86_400.0, 86_400.0), ..marker };
         let markers = &mut self.active_mut().markers;
         markers.retain(|m| (m.time - marker.time).abs() > 1e-6);
         let at = markers.partition_point(|m| m.time < marker.time);

@@ -24,12 +24,12 @@ use std::sync::Arc;
 /// What the viewport spends on a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Quality {
-    /// Half the pixels each way, no smoothing of edges, plain light.
+    /// Half the pixels each way, no smoothing of edges.
     Draft,
     /// Every pixel, smoothed edges when nothing moves.
     #[default]
     Normal,
-    /// As an export draws it.
+    /// Smoothed edges at every moment, as an export draws it.
     Exact,
 }
 

@@ -23,8 +23,19 @@ impl State {
         let loose = self.loose.get(&bone).and_then(|l| l.theta);
         loose.unwrap_or_else(|| match self.track_of(&Target::Xzx(bone)) {
             Some(track) if !self.loose.contains_key(&bone) => self.sampled3(track),
-            _ => self.pose().xzx(self.document.skeleton(), bone, self.keyed_theta(bone)),
+            _ => self.pose_of_bone(bone).xzx(self.document.skeleton(), bone, self.keyed_theta(bone)),
         })
+    }
+
+    /// The rest pose but for one bone, as it stands: a window that asks each frame must not pay for all tracks.
+    pub fn pose_of_bone(&self, bone: BoneId) -> Pose {
+        let (skeleton, mut pose) = (self.document.skeleton(), self.document.asset.character.rest_pose());
+        let own = self.active().tracks.iter().filter(|t| t.target.bone() == Some(bone));
+        own.for_each(|t| t.sample(skeleton, self.time, &mut pose));
+        if let Some(loose) = self.loose.get(&bone) {
+            pose.locals[bone.index()] = loose.local;
+        }
+        pose
     }
 
     /// The angles that the bone's track has now.

@@ -122,7 +122,7 @@ mod tests {
         let far = clip(vec![0.0, 1e30], Interpolation::Linear);
         assert!(matches!(resample(&far, 30.0), Err(EditError::Times { .. })));
         let long = clip(vec![0.0, 1e5], Interpolation::Linear);
-        assert!(matches!(resample(&long, 30.0), Ok(_)));
+        assert!(resample(&long, 30.0).is_ok());
         assert!(matches!(resample(&long, 240.0), Err(EditError::Times { .. })));
     }
 }

@@ -166,7 +166,7 @@ impl<'a> Gauge<'a> {
         pose
     }
 
-    /// The diagonal of the box around all vertices at rest, metres.
+    /// The diagonal of the box around all vertices at rest, metres; around the bones' origins and tips where there are none.
     pub fn diagonal(&self) -> f64 {
         let c = self.character;
         let mut bench = Bench::default();
@@ -177,6 +177,13 @@ impl<'a> Gauge<'a> {
             let p = &mut bench.positions[0];
             c.positions(instance, &self.rest, &posed, center, &mut bench.scratch, p);
             bounds = p.iter().fold(bounds, |[lo, hi], p| [lo.min(*p), hi.max(*p)]);
+        }
+        if bounds[0].x > bounds[1].x {
+            for bone in c.skeleton().ids() {
+                let frame = posed.near(bone, center);
+                let ends = [Vec3::ZERO, c.skeleton().tip(bone)].map(|p| frame.transform_point3(p));
+                bounds = ends.iter().fold(bounds, |[lo, hi], p| [lo.min(*p), hi.max(*p)]);
+            }
         }
         if bounds[0].x > bounds[1].x { 0.0 } else { (bounds[1] - bounds[0]).as_dvec3().length() }
     }

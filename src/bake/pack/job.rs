@@ -175,10 +175,12 @@ impl Job {
         for (k, &t) in self.source.times().iter().enumerate() {
             let v = self.source.value(k);
             if times.last() == Some(&t) {
-                (times.pop(), keys.pop());
+                times.pop();
+                keys.pop();
             }
             if keys.last().is_none_or(|&l| self.samples.distance(self.source.value(l), v) > 0.5 * allowed) {
-                (times.push(t), keys.push(k));
+                times.push(t);
+                keys.push(k);
             }
         }
         let values: Vec<f64> = keys.iter().flat_map(|&k| self.coordinates(self.source.value(k))).collect();
@@ -193,7 +195,7 @@ impl Job {
     /// Straight pieces between keys at times of their own.
     fn pieces(&self, allowed: f64) -> Option<(Draft, usize)> {
         let s = &self.samples;
-        let p = pieces::fitted(s, 0.75 * allowed, <[f32]>::to_vec);
+        let p = pieces::fitted(s, 0.75 * allowed, false, <[f32]>::to_vec);
         let times: Vec<f64> = p.keys.iter().map(|&k| s.times[k]).collect();
         let values: Vec<f64> = p.values.chunks(s.width).flat_map(|v| self.coordinates(v)).collect();
         let error = |played: &[f64]| {

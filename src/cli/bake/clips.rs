@@ -94,7 +94,8 @@ pub(super) fn edited(
         let all: Vec<&Clip> = out.iter().map(|c| &c.0).collect();
         out = vec![(edit::concat(name, &all), None)];
     }
-    out.into_iter().map(|(clip, replaces)| placed(args, import, clip, replaces, desc)).collect()
+    let alone = out.len() == 1;
+    out.into_iter().map(|(clip, replaces)| placed(args, import, clip, replaces, desc, alone, say)).collect()
 }
 
 fn trimmed(clip: &Clip, [from, to]: [Option<f64>; 2], say: &Say) -> Result<Clip, Failure> {
@@ -119,6 +120,8 @@ fn placed(
     mut clip: Clip,
     replaces: Option<usize>,
     desc: &BakeDesc,
+    alone: bool,
+    say: &Say,
 ) -> Result<Edited, Failure> {
     let character = &import.asset.character;
     if args.mirror {
@@ -131,9 +134,12 @@ fn placed(
     }
     let mut motion = None;
     if let Some(how) = &args.in_place {
-        let (still, way) =
-            edit::in_place(character, &clip, how == "heading").map_err(|e| refused("--in-place", &e))?;
-        (clip, motion) = (still, Some(way));
+        match edit::in_place(character, &clip, how == "heading") {
+            Ok((still, way)) => (clip, motion) = (still, Some(way)),
+            // Among several clips some stand still anyway.
+            Err(e @ EditError::NoRoot { .. }) if !alone => say.note(&format!("--in-place: {e}")),
+            Err(e) => return Err(refused("--in-place", &e)),
+        }
     }
     if let Some(seconds) = args.loop_blend {
         clip = edit::blend(&clip, seconds);

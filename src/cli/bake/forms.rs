@@ -2,13 +2,13 @@
 
 use super::clips::Edited;
 use super::report::{self, Done};
-use super::{Args, failure, write};
+use super::write::{self, put_bytes};
+use super::{Args, failure};
 use crate::cli::{Failure, say::Say};
 use serde_json::{Map, Value, json};
 use sinew::asset::Asset;
 use sinew::bake::{self, BakeDesc, Baked, influences};
 use sinew::clip::Clip;
-use sinew::io::picture::{AtomicFile, Folder};
 use sinew::io::still::{self, Stance, Still};
 use sinew::io::{self, Import, gltf, obj, pc2, ply, sinew_clip, stl};
 use sinew::pose::Pose;
@@ -57,7 +57,7 @@ impl Forms {
         match (self.pose_at, self.vertices) {
             (Some(_), _) => &["glb", "gltf", "obj", "ply", "stl"],
             (None, true) => &["glb", "gltf", "pc2"],
-            (None, false) => &["glb", "gltf", "sinew"],
+            (None, false) => &["glb", "gltf", "json", "sinew"],
         }
     }
 
@@ -104,8 +104,8 @@ impl Forms {
         let told = json!({"pose_at": t, "clip": clips.first().map(|c| &c.name)});
         match ending(output).as_str() {
             "obj" => with_materials(args, output, &stance.at(&pose), asset),
-            "ply" => put(args, output, &ply::write(&stance.at(&pose))),
-            "stl" => put(args, output, &stl::write(&stance.at(&pose))),
+            "ply" => put_bytes(args, output, &ply::write(&stance.at(&pose))),
+            "stl" => put_bytes(args, output, &stl::write(&stance.at(&pose))),
             _ => frozen(args, [input, output], import, &[pose], 1.0, "pose", &told),
         }?;
         Ok(told)
@@ -152,7 +152,7 @@ impl Forms {
                 bytes.extend(pc2::sample(&points));
             }
             with_materials(args, &output.with_extension("obj"), &still, &import.asset)?;
-            put(args, output, &bytes)?;
+            put_bytes(args, output, &bytes)?;
         } else {
             let poses: Vec<Pose> = (0..=intervals).map(|k| pose(time(k as f64))).collect();
             frozen(args, [input, output], import, &poses, self.vertices_fps, &clip.name, &told)?;
@@ -198,15 +198,11 @@ fn groups(import: &Import) -> Vec<u32> {
     import.primitives.iter().map(|p| p.node).collect()
 }
 
-fn put(args: &Args, path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    AtomicFile::write(path, bytes, args.force, Folder::MustExist).map_err(|e| Failure::Run(e.to_string()))
-}
-
 fn with_materials(args: &Args, path: &Path, still: &Still, asset: &Asset) -> Result<(), Failure> {
     let library = path.with_extension("mtl");
     let name = library.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    put(args, &library, obj::materials(asset).as_bytes())?;
-    put(args, path, obj::write(still, asset, Some(&name)).as_bytes())
+    put_bytes(args, &library, obj::materials(asset).as_bytes())?;
+    put_bytes(args, path, obj::write(still, asset, Some(&name)).as_bytes())
 }
 
 /// A glTF file of poses, with the look of the input.
@@ -253,8 +249,8 @@ fn packed(
         packed.push((e.clip.name.as_str(), one.packed));
     }
     let all: Vec<_> = packed.iter().map(|(name, p)| (*name, p)).collect();
-    put(args, output, &sinew_clip::write(c, &all))?;
+    put_bytes(args, output, &sinew_clip::write(c, &all))?;
     let diagonal = bake::Gauge::new(c, 1).diagonal();
     done.iter().filter(|_| !args.json).for_each(|d| say.note(&report::line(import, d, diagonal)));
-    Ok(report::report(import, &done, args, desc.tolerance, diagonal))
+    Ok(report::report(import, &done, args, desc, diagonal))
 }

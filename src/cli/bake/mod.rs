@@ -2,7 +2,10 @@
 
 mod clips;
 mod forms;
+mod fresh;
+mod motion;
 mod report;
+mod to;
 mod values;
 mod write;
 
@@ -13,7 +16,8 @@ use forms::Forms;
 use report::Done;
 use serde_json::{Value, json};
 use sinew::bake::edit::EditError;
-use sinew::bake::{self, BakeDesc, BakeError, Gauge, Goal, Metric, Stage};
+use sinew::bake::{BakeDesc, BakeError, Gauge, Goal, Metric, Stage};
+use sinew::clip::Clip;
 use sinew::io::{Import, Options};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -26,6 +30,10 @@ Examples:
   sinew bake fox.glb -o run.gltf --clip Run --json
   sinew bake fox.glb -o back.glb --clip Walk --trim 0.2..0.6 --reverse --speed 1.5
   sinew bake fox.glb -o all.glb --concat Everything
+  sinew bake fox.glb -o fox.json                        a rig of ours: XZX angles, to be edited
+  sinew bake fox.json -o fox.glb                        and back
+  sinew bake walk.bvh -o walk.glb                       a capture on its own skeleton
+  sinew bake hero.glb --motion walk.bvh -o walks.glb --retarget map.json
   sinew bake walk.glb -o spot.glb --in-place --loop-blend 0.2s --mirror
   sinew bake wave.glb -o wave-add.glb --additive first --fps 30 --keep-keys
   sinew bake *.glb -o small/{name}.glb                  many files; one that fails does not stop the others
@@ -35,18 +43,19 @@ Examples:
   sinew bake fox.glb -o light.glb --influences 2
   sinew bake fox.glb -o clips/{name}-{clip}.glb         each clip in a file of its own
 
-No vertex of the skin moves by more than the tolerance, at any time: at keys, at frames and between them, compared
-240 times a second or more, with an estimate of what hides between. What was reached is printed
-and written into asset.extras.sinew. Everything but the animations is carried through untouched. Where the bound cannot be kept, nothing is
+No vertex of the skin moves by more than the tolerance, at any time: vertices are compared at all keys, and between
+them until the second derivatives of the bones' motion leave no room for more. What was reached is printed and
+written into asset.extras.sinew. From glTF to glTF everything but the animations is carried through untouched. Where the bound cannot be kept, nothing is
 written and the exit code is 4.";
 
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// glTF files (.gltf, .glb).
+    /// glTF files (.gltf, .glb), rigs (.json) or captures (.bvh).
     #[arg(required = true, value_name = "INPUT")]
     inputs: Vec<PathBuf>,
-    /// Where the result goes: .glb, .gltf with a .bin beside it, or .sinew for packed clips. {name} and {folder} are the input's, {clip} and {index} make a file a clip.
+    /// Where the result goes: .glb, .gltf with a .bin beside it, .json (a rig of ours) with poses and pictures beside it, or .sinew for
+    /// packed clips. {name} and {folder} are the input's, {clip} and {index} make a file a clip.
     #[arg(short, long, value_name = "FILE")]
     output: String,
     /// How far any vertex may be off: metres (0.001, 1m, 2cm, 0.5mm) or a part of the rest pose's diagonal (0.02%).
@@ -78,6 +87,10 @@ pub struct Args {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
+    to: to::To,
+    #[command(flatten)]
+    motion: motion::Motion,
+    #[command(flatten)]
     edits: EditArgs,
     #[command(flatten)]
     forms: Forms,
@@ -86,6 +99,7 @@ pub struct Args {
 pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     let mut names = Names::new(&args.output)?;
     write::check_name(&names.example(), args.forms.endings())?;
+    args.to.form(Path::new(&names.example()))?;
     names.tell_apart(args.inputs.len())?;
     let many = args.inputs.len() > 1 || names.template.tells_clips();
     let (mut outcome, mut told) = (Outcome::default(), vec![]);
@@ -118,15 +132,16 @@ fn file(
     if !apart {
         let output = write::claim(args, names, input, "", 0)?;
         write::check_output(args, names, &output)?;
-        return one(args, &read(args, input, say)?, input, &output, None, told, outcome, say);
+        let (import, motions) = read(args, input, say)?;
+        return one(args, &import, &motions, input, &output, None, told, outcome, say);
     }
-    let import = read(args, input, say)?;
+    let (import, motions) = read(args, input, say)?;
     for clip in chosen(args, input, &import)? {
         let name = &import.asset.character.clips()[clip].name;
         let output = write::claim(args, names, input, name, clip);
         let done = output.and_then(|output| {
             write::check_output(args, names, &output)?;
-            one(args, &import, input, &output, Some(clip), told, outcome, say)
+            one(args, &import, &motions, input, &output, Some(clip), told, outcome, say)
         });
         if let Err(failure) = done {
             told.push(
@@ -138,13 +153,18 @@ fn file(
     Ok(())
 }
 
-fn read(_args: &Args, input: &Path, say: &Say) -> Result<Import, Failure> {
-    let import = load(input, Options::default(), say)?;
-    if import.format != "glTF" {
-        let message = format!("{}: baking reads glTF files; this is a {}", input.display(), import.format);
+/// The input, its clips perhaps those of other files.
+fn read(args: &Args, input: &Path, say: &Say) -> Result<(Import, Vec<Value>), Failure> {
+    // From glTF to glTF pictures are not touched.
+    let named = |e: &str| input.extension().is_some_and(|x| x.eq_ignore_ascii_case(e));
+    let textures = to::is_rig(Path::new(&args.output)) || !(named("glb") || named("gltf"));
+    let mut import = load(input, Options { textures }, say)?;
+    if import.setting.is_some() {
+        let message = format!("{}: this is a {}; expected a character", input.display(), import.format);
         return Err(Failure::Usage(message));
     }
-    Ok(import)
+    let motions = args.motion.apply(&mut import, say)?;
+    Ok((import, motions))
 }
 
 fn chosen(args: &Args, input: &Path, import: &Import) -> Result<Vec<usize>, Failure> {
@@ -153,7 +173,7 @@ fn chosen(args: &Args, input: &Path, import: &Import) -> Result<Vec<usize>, Fail
         Some(one) if args.clip.is_some() => vec![one],
         _ => (0..clips.len()).collect(),
     };
-    if chosen.is_empty() {
+    if chosen.is_empty() && import.format == "glTF" && !to::is_rig(Path::new(&args.output)) {
         return Err(Failure::Input(format!("{}: there are no clips to bake", input.display())));
     }
     Ok(chosen)
@@ -170,13 +190,18 @@ fn desc(args: &Args, import: &Import) -> Result<(BakeDesc, f64), Failure> {
             || Failure::Usage(format!("--pin {name}: there is no such bone; `sinew info` lists them"));
         Ok((character.skeleton().find(name).ok_or_else(missing)?, *limit))
     });
+    let vertices = character.instances().iter().map(|i| character.mesh(i).positions.len()).sum::<usize>();
     let tolerance = match args.tolerance {
         Tolerance::Metres(m) => m,
         Tolerance::OfDiagonal(part) => part * diagonal,
     };
     let desc = BakeDesc {
         tolerance,
-        metric: args.metric,
+        metric: match args.metric {
+            // A skeleton without a skin: what may hang on its bones.
+            Metric::Vertices if vertices == 0 => Metric::Shell(0.02 * diagonal),
+            metric => metric,
+        },
         pins: pins.collect::<Result<_, _>>()?,
         quantize: !args.no_quantize,
         goal: args.fewest,
@@ -190,6 +215,7 @@ fn desc(args: &Args, import: &Import) -> Result<(BakeDesc, f64), Failure> {
 fn one(
     args: &Args,
     import: &Import,
+    motions: &[Value],
     input: &Path,
     output: &Path,
     clip: Option<usize>,
@@ -198,6 +224,7 @@ fn one(
     say: &Say,
 ) -> Result<(), Failure> {
     let chosen = clip.map_or_else(|| chosen(args, input, import), |c| Ok(vec![c]))?;
+    let form = args.to.form(output)?;
     let (desc, diagonal) = desc(args, import)?;
     let placed = |f: Failure| {
         let message = format!("{}: {}", input.display(), f.message());
@@ -217,6 +244,7 @@ fn one(
     let bar = say.clip_progress(edited.len());
     let mut done = vec![];
     for e in &edited {
+        tell_coarse_times(&e.clip, say);
         let desc = BakeDesc { cycle: e.cycle, over: e.over.clone(), ..desc.clone() };
         let poses = AtomicUsize::new(0);
         let watch = |stage: Stage, n: usize| {
@@ -225,16 +253,19 @@ fn one(
             let clip = say::name(&e.clip.name);
             bar.set_message(format!("{}, {clip}: {doing}, {all} poses compared", input.display()));
         };
-        let baked = bake::bake_watched(&import.asset.character, &e.clip, &desc, &watch);
+        let baked = to::bake(form, &import.asset.character, &e.clip, &desc, &watch);
         done.push(Done { edited: e, baked: baked.map_err(failure).map_err(placed)? });
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let mut report = report::report(import, &done, args, desc.tolerance, diagonal);
+    let mut report = report::report(import, &done, args, &desc, diagonal);
+    if !motions.is_empty() {
+        report["motions"] = motions.into();
+    }
     if let Some((_, cost)) = &limited {
         report["influences"] = cost.clone();
     }
-    write::write(args, input, output, import, &done, &report)?;
+    write::write(args, input, output, import, &done, &report, say)?;
     outcome.done += 1;
     for d in done.iter().filter(|_| !args.json) {
         say.note(&report::line(import, d, diagonal));
@@ -245,6 +276,18 @@ fn one(
         say.note(&format!("wrote {}", output.display()));
     }
     Ok(())
+}
+
+/// Late keys that single precision does not tell apart 240 times a second.
+fn tell_coarse_times(clip: &Clip, say: &Say) {
+    let end = clip.range().end as f32;
+    let step = end.next_up() - end;
+    if step > 1.0 / 240.0 && step < 1.0 {
+        let name = say::name(&clip.name);
+        say.warn(&format!(
+            "clip {name}: its keys at {end} s are stored in single precision, {step} s apart at best"
+        ));
+    }
 }
 
 fn failure(e: BakeError) -> Failure {

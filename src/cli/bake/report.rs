@@ -4,7 +4,7 @@ use super::Args;
 use super::clips::Edited;
 use crate::cli::say;
 use serde_json::{Value, json};
-use sinew::bake::{Baked, Metric, Spot};
+use sinew::bake::{BakeDesc, Baked, Metric, Spot};
 use sinew::io::Import;
 
 /// A clip, and what was made of it.
@@ -47,8 +47,8 @@ pub(super) fn worst(import: &Import, b: &Baked) -> Value {
     worst
 }
 
-pub(super) fn report(import: &Import, done: &[Done], args: &Args, metres: f64, diagonal: f64) -> Value {
-    let metric_name = match args.metric {
+pub(super) fn report(import: &Import, done: &[Done], args: &Args, desc: &BakeDesc, diagonal: f64) -> Value {
+    let metric_name = match desc.metric {
         Metric::Vertices => "vertices".to_owned(),
         Metric::Shell(radius) => format!("shell of {radius} m"),
     };
@@ -73,5 +73,5 @@ pub(super) fn report(import: &Import, done: &[Done], args: &Args, metres: f64, d
         }
         told
     });
-    json!({"tolerance": metres, "diagonal": diagonal, "metric": metric_name, "clips": clips.collect::<Vec<_>>()})
+    json!({"tolerance": desc.tolerance, "diagonal": diagonal, "metric": metric_name, "clips": clips.collect::<Vec<_>>()})
 }

@@ -1,9 +1,9 @@
 //! The file that comes out.
 
-use super::Args;
 use super::report::Done;
+use super::{Args, fresh, to};
 use crate::cli::batch::{self, Names};
-use crate::cli::{Failure, say};
+use crate::cli::{Failure, say, say::Say};
 use serde_json::{Map, Value, json};
 use sinew::io::picture::{AtomicFile, Folder};
 use sinew::io::{self, Import, gltf};
@@ -59,18 +59,78 @@ pub(super) fn write(
     import: &Import,
     done: &[Done],
     report: &Value,
+    say: &Say,
 ) -> Result<(), Failure> {
+    let extras = Map::from_iter([("sinew".to_owned(), report.clone())]);
+    if to::is_rig(output) {
+        for (name, bytes) in fresh::rig(output, input, import, done, say)? {
+            put_bytes(args, &output.with_file_name(name), &bytes)?;
+        }
+        return Ok(());
+    }
+    let mut out = match import.format.as_str() {
+        "glTF" => rewritten(args, input, import, done, extras)?,
+        _ => fresh::gltf(input, import, done, extras, say)?,
+    };
+    notes(args, import, done, &mut out);
+    // What lies beside the input is not beside an output in another folder.
+    let there = output.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder(input);
+    let bad = |e| Failure::Input(format!("{}: {e}", input.display()));
+    if folder.canonicalize().ok() != there.canonicalize().ok() {
+        out.embed_pictures(Some(folder)).map_err(bad)?;
+    }
+    // What came packed does not grow.
+    if args.forms.meshopt || import.extensions.iter().any(|e| e == "EXT_meshopt_compression") {
+        out.compress().map_err(bad)?;
+    }
+    put(args, output, &out)
+}
+
+/// One file, or two.
+pub(super) fn put(args: &Args, output: &Path, out: &gltf::Rewritten) -> Result<(), Failure> {
+    if output.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf")) {
+        let bin = output.with_extension("bin");
+        let uri = bin.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        put_bytes(args, &bin, &out.bin)?;
+        return put_bytes(args, output, &out.gltf(&uri));
+    }
+    put_bytes(args, output, &out.glb())
+}
+
+pub(super) fn put_bytes(args: &Args, path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    AtomicFile::write(path, bytes, args.force, Folder::MustExist).map_err(|e| Failure::Run(e.to_string()))
+}
+
+fn folder(input: &Path) -> &Path {
+    input.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// The input with other clips.
+fn rewritten(
+    args: &Args,
+    input: &Path,
+    import: &Import,
+    done: &[Done],
+    extras: Map<String, Value>,
+) -> Result<gltf::Rewritten, Failure> {
     let bad = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", input.display()));
     let bytes = io::read_file(input).map_err(|e| bad(&e))?;
-    let folder = input.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let clips: Vec<gltf::NewClip> = done
         .iter()
-        .map(|d| gltf::NewClip { clip: &d.baked.clip, short: &d.baked.short, replaces: d.edited.replaces })
+        .map(|d| gltf::NewClip {
+            clip: &d.baked.clip,
+            short: &d.baked.short,
+            replaces: d.edited.replaces.filter(|_| args.motion.is_empty()),
+        })
         .collect();
-    let extras = Map::from_iter([("sinew".to_owned(), report.clone())]);
     let name = input.display().to_string();
     let write = if args.forms.limits() { gltf::with_clips_and_influences } else { gltf::with_clips };
-    let mut out = write(&bytes, Some(folder), &name, import, &clips, extras).map_err(|e| bad(&e))?;
+    write(&bytes, Some(folder(input)), &name, import, &clips, extras).map_err(|e| bad(&e))
+}
+
+/// What the clips' edits leave to be said.
+fn notes(args: &Args, import: &Import, done: &[Done], out: &mut gltf::Rewritten) {
     for (i, d) in done.iter().enumerate() {
         if let Some(from) = args.edits.reference() {
             out.note(i, "additive", from.into());
@@ -86,28 +146,4 @@ pub(super) fn write(
             out.add_moving_node(i, "root motion", &m.times, &way, &m.yaw);
         }
     }
-    // What lies beside the input is not beside an output in another folder.
-    let there = output.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    if folder.canonicalize().ok() != there.canonicalize().ok() {
-        out.embed_pictures(Some(folder)).map_err(|e| bad(&e))?;
-    }
-    // What came packed does not grow.
-    if args.forms.meshopt || import.extensions.iter().any(|e| e == "EXT_meshopt_compression") {
-        out.compress().map_err(|e| bad(&e))?;
-    }
-    put(args, output, &out)
-}
-
-/// One file, or two.
-pub(super) fn put(args: &Args, output: &Path, out: &gltf::Rewritten) -> Result<(), Failure> {
-    let put = |path: &Path, bytes: &[u8]| {
-        AtomicFile::write(path, bytes, args.force, Folder::MustExist).map_err(|e| Failure::Run(e.to_string()))
-    };
-    if output.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf")) {
-        let bin = output.with_extension("bin");
-        let uri = bin.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        put(&bin, &out.bin)?;
-        return put(output, &out.gltf(&uri));
-    }
-    put(output, &out.glb())
 }

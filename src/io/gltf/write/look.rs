@@ -9,17 +9,23 @@ use crate::io::gltf::rewrite::{Rewritten, mime};
 use crate::scene::{AlphaMode, Filter, Material, TextureRef, WrapMode};
 use glam::{Affine2, Vec3, Vec4};
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 
 /// Materials, textures, samplers and pictures.
 pub(super) fn write(out: &mut Rewritten, asset: &Asset, pictures: &[Vec<u8>], warnings: &mut Vec<Warning>) {
     let has_pictures = !pictures.is_empty() && pictures.len() == asset.textures.len();
     let mut used = Extensions::default();
+    let mut place = vec![0; asset.textures.len()];
+    let referred = asset.materials.iter().flat_map(maps).map(|m| m.texture.0).collect::<BTreeSet<u32>>();
+    referred.iter().enumerate().for_each(|(i, t)| place[*t as usize] = i);
+    let places = has_pictures.then_some(&place[..]);
     for m in &asset.materials {
-        let json = material(m, has_pictures, &mut used, warnings);
+        let json = material(m, places, &mut used, warnings);
         out.push("materials", json);
     }
     if has_pictures {
-        for (texture, bytes) in asset.textures.iter().zip(pictures) {
+        let list = asset.textures.iter().zip(pictures).enumerate();
+        for (_, (texture, bytes)) in list.filter(|(i, _)| referred.contains(&(*i as u32))) {
             let view = out.view(bytes);
             let source = out.push("images", json!({"bufferView": view, "mimeType": mime(bytes)}));
             let wrap = |w: WrapMode| match w {
@@ -49,11 +55,21 @@ pub(super) fn write(out: &mut Rewritten, asset: &Asset, pictures: &[Vec<u8>], wa
     }
 }
 
+/// References that have a place in glTF.
+fn maps(m: &Material) -> impl Iterator<Item = TextureRef> {
+    [m.diffuse_map, m.normal_map, m.occlusion_map, m.emissive_map].into_iter().flatten()
+}
+
 /// Names of extensions, each once.
 #[derive(Default)]
-struct Extensions(std::collections::BTreeSet<&'static str>);
+struct Extensions(BTreeSet<&'static str>);
 
-fn material(m: &Material, pictures: bool, used: &mut Extensions, warnings: &mut Vec<Warning>) -> Value {
+fn material(
+    m: &Material,
+    places: Option<&[usize]>,
+    used: &mut Extensions,
+    warnings: &mut Vec<Warning>,
+) -> Value {
     let mut warn = |message: &str| {
         warnings.push(Warning { place: format!("material `{}`", m.name), message: message.into() })
     };
@@ -66,9 +82,8 @@ fn material(m: &Material, pictures: bool, used: &mut Extensions, warnings: &mut 
     if !m.name.is_empty() {
         json["name"] = m.name.clone().into();
     }
-    let mut map = |of: Option<TextureRef>, extra: Value| -> Option<Value> {
-        Some(lay(of.filter(|_| pictures)?, extra, used))
-    };
+    let mut map =
+        |of: Option<TextureRef>, extra: Value| -> Option<Value> { Some(lay(of?, places?, extra, used)) };
     if let Some(t) = map(m.diffuse_map, json!({})) {
         pbr["baseColorTexture"] = t;
     }
@@ -114,8 +129,8 @@ fn material(m: &Material, pictures: bool, used: &mut Extensions, warnings: &mut 
 }
 
 /// A reference to a texture, as it lies on the surface.
-fn lay(of: TextureRef, mut json: Value, used: &mut Extensions) -> Value {
-    json["index"] = of.texture.0.into();
+fn lay(of: TextureRef, places: &[usize], mut json: Value, used: &mut Extensions) -> Value {
+    json["index"] = places[of.texture.0 as usize].into();
     if of.uv_set > 0 {
         json["texCoord"] = of.uv_set.into();
     }

@@ -1,20 +1,22 @@
 //! The graph editor: values over time. What is seen is sampled every other point; the value axis fits itself.
 
+mod channel;
+mod draw;
+
+pub use draw::singular;
+
 use super::axis::{self, Axis, RULER, SELECTED};
-use super::dope::{Names, menu};
 use super::grip::{Drag, Grip};
+use super::parts::{Names, menu};
 use crate::Bus;
 use crate::commands::Task;
-use crate::state::document::{components, track_name};
 use crate::state::{Command, Keys, Mode, Spans, State, TrackKeys};
+use channel::{Channel, Values, channels, extent, nearest};
+use draw::{curve, legend, levels, tangent};
 use egui::{Align2, Color32, FontId, PointerButton, Pos2, Rect, Sense, Stroke, Vec2, pos2};
-use sinew::clip::{Interpolation, Target, Track};
 
 /// Width of the values.
-const LABELS: f32 = 58.0;
-/// Curves shown at once; more could not be told apart.
-const MOST: usize = 96;
-
+const LABELS: f32 = 66.0;
 /// The pane.
 #[derive(Default)]
 pub struct Graph {
@@ -25,66 +27,6 @@ pub struct Graph {
     last_time: f64,
     /// What a command asked for, to be done when the pane is drawn next.
     pub pending: Option<Task>,
-}
-
-/// One component of a track.
-struct Channel<'a> {
-    track: usize,
-    component: usize,
-    of: &'a Track,
-    name: String,
-    color: Color32,
-    /// Shown value is `(stored · unit − middle) / half`: degrees, or −1…1 where curves are normalised.
-    unit: f64,
-    middle: f64,
-    half: f64,
-}
-
-impl Channel<'_> {
-    fn shown(&self, stored: f32) -> f64 {
-        (f64::from(stored) * self.unit - self.middle) / self.half
-    }
-
-    /// Stored value a unit of the axis.
-    fn stored_unit(&self) -> f64 {
-        self.half / self.unit
-    }
-
-    fn key(&self, k: usize) -> (f64, f64) {
-        (self.of.curve.times()[k], self.shown(self.of.curve.value(k)[self.component]))
-    }
-
-    fn at(&self, t: f64) -> f64 {
-        if let Target::Rotation(_) = self.of.target {
-            return self.shown(self.of.curve.sample_rotation(t).to_array()[self.component]);
-        }
-        let mut v = vec![0.0; self.of.curve.width()];
-        self.of.curve.sample(t, &mut v);
-        self.shown(v[self.component])
-    }
-
-    fn bit(&self) -> u8 {
-        1 << self.component.min(7)
-    }
-}
-
-/// Values to points.
-#[derive(Clone, Copy)]
-struct Values {
-    rect: Rect,
-    low: f64,
-    high: f64,
-}
-
-impl Values {
-    fn y(&self, v: f64) -> f32 {
-        let part = (v - self.low) / (self.high - self.low);
-        self.rect.bottom() - (part.clamp(-1e3, 1e3) as f32) * self.rect.height()
-    }
-
-    fn v(&self, y: f32) -> f64 {
-        self.low + f64::from((self.rect.bottom() - y) / self.rect.height()) * (self.high - self.low)
-    }
 }
 
 impl Graph {
@@ -157,13 +99,13 @@ impl Graph {
         let mut fit = self.held.is_none();
         let left = Rect::from_min_size(rect.min, Vec2::new(rect.width() / 2.0, rect.height())).shrink(2.0);
         let right = left.translate(Vec2::new(rect.width() / 2.0, 0.0));
-        let toggled = ui.put(left, egui::Button::new("fit").small().selected(fit));
+        let toggled = ui.put(left, small("fit", fit));
         let help = "Values fit the pane by themselves; Shift and the wheel, or a middle drag, hold them";
         if toggled.on_hover_text(help).accessible_name("Fit values").clicked() {
             fit = !fit;
             self.held = if fit { None } else { self.last_fit };
         }
-        let normal = ui.put(right, egui::Button::new("0–1").small().selected(state.view.normalise));
+        let normal = ui.put(right, small("0–1", state.view.normalise));
         if normal
             .on_hover_text("Each curve fills the height (N)")
             .accessible_name("Normalise curves")
@@ -273,6 +215,8 @@ impl Graph {
         levels(&painter, values, ui.visuals());
         let mut mesh = egui::Mesh::default();
         let mut names = Names(ui);
+        // Slopes of many keys would hide the curves.
+        let few = state.selection.key_count() <= 24;
         for c in channels {
             curve(&inner, axis, values, c);
             let chosen = state.selection.keys.get(&(c.track as u32)).filter(|k| k.mask & c.bit() != 0);
@@ -284,7 +228,7 @@ impl Graph {
                 let (t, v) = c.key(k);
                 let at = pos2(axis.x(t), values.y(v));
                 let on = chosen.is_some_and(|s| s.spans.contains(k));
-                if on {
+                if on && few {
                     tangent(&inner, axis, values, c, k, at);
                 }
                 axis::diamond(&mut mesh, at, if on { 5.5 } else { 4.5 }, if on { SELECTED } else { c.color });
@@ -309,181 +253,9 @@ impl Graph {
     }
 }
 
-/// Curves of the selected bones, or of the tracks whose keys are selected.
-fn channels<'a>(state: &'a State, axis: &Axis) -> Vec<Channel<'a>> {
-    let skeleton = state.document.skeleton();
-    let bones = &state.selection.bones;
-    let of = |(i, t): &(usize, &std::sync::Arc<Track>)| match t.target.bone() {
-        Some(b) if !bones.is_empty() => bones.contains(&b),
-        _ => state.selection.keys.contains_key(&(*i as u32)),
-    };
-    let mut out = Vec::new();
-    for (track, t) in state.active().tracks.iter().enumerate().filter(of) {
-        let full = track_name(skeleton, t);
-        let bone = full.rsplit_once('.').map_or(full.as_str(), |(b, _)| b);
-        let unit = if matches!(t.target, Target::Xzx(_)) { 180.0 / std::f64::consts::PI } else { 1.0 };
-        for (component, name) in components(t).into_iter().enumerate() {
-            let color = hue(component, track);
-            let mut c = Channel {
-                track,
-                component,
-                of: t,
-                name: format!("{bone}.{name}"),
-                color,
-                unit,
-                middle: 0.0,
-                half: 1.0,
-            };
-            if state.view.normalise {
-                let (lo, hi) = extent(&c, axis);
-                (c.middle, c.half) = ((lo + hi) / 2.0, ((hi - lo) / 2.0).max(1e-6));
-            }
-            out.push(c);
-            if out.len() == MOST {
-                return out;
-            }
-        }
-    }
-    out
-}
-
-/// Red, green, blue by component; paler from bone to bone.
-fn hue(component: usize, track: usize) -> Color32 {
-    let base = [[240, 90, 90], [110, 210, 90], [90, 150, 255], [220, 180, 80]][component % 4];
-    let pale = (track % 3) as f32 * 0.25;
-    let [r, g, b] = base.map(|c| (c as f32 + (235.0 - c as f32) * pale) as u8);
-    Color32::from_rgb(r, g, b)
-}
-
-/// Smallest and largest value of what can be seen of a curve.
-fn extent(c: &Channel<'_>, axis: &Axis) -> (f64, f64) {
-    let samples =
-        (0..=64).map(|i| axis.t(axis.rect.left() + axis.rect.width() * i as f32 / 64.0)).map(|t| c.at(t));
-    let seen = axis.visible(c.of.curve.times());
-    let step = (seen.len() / 256).max(1);
-    let keys = seen.step_by(step).map(|k| c.key(k).1);
-    samples.chain(keys).fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| (lo.min(v), hi.max(v)))
-}
-
-/// The key within half a hit area of a point.
-fn nearest<'c, 'a>(
-    channels: &'c [Channel<'a>],
-    axis: &Axis,
-    values: &Values,
-    at: Pos2,
-) -> Option<(&'c Channel<'a>, usize)> {
-    let (t0, t1) = (axis.t(at.x - axis::HIT), axis.t(at.x + axis::HIT));
-    let near = channels.iter().flat_map(|c| {
-        let times = c.of.curve.times();
-        let run = times.partition_point(|&t| t < t0)..times.partition_point(|&t| t <= t1);
-        run.map(move |k| (c, k))
-    });
-    let far = |(c, k): &(&Channel<'_>, usize)| {
-        let (t, v) = c.key(*k);
-        pos2(axis.x(t), values.y(v)).distance(at)
-    };
-    near.filter(|n| far(n) <= axis::HIT * 1.4).min_by(|a, b| far(a).total_cmp(&far(b)))
-}
-
-fn curve(painter: &egui::Painter, axis: &Axis, values: &Values, c: &Channel<'_>) {
-    let stroke = Stroke::new(1.3, c.color);
-    let rect = axis.rect;
-    let mut points = Vec::new();
-    if c.of.curve.interpolation() == Interpolation::Hold {
-        // Steps, drawn as steps, by the keys that are there, as far as they can be told apart.
-        let mut last = c.at(axis.t(rect.left()));
-        points.push(pos2(rect.left(), values.y(last)));
-        let mut x = rect.left();
-        for k in axis.visible(c.of.curve.times()) {
-            let (t, v) = c.key(k);
-            if axis.x(t) - x >= 1.0 {
-                x = axis.x(t);
-                points.push(pos2(x, values.y(last)));
-                points.push(pos2(x, values.y(v)));
-            }
-            last = v;
-        }
-        points.push(pos2(rect.right(), values.y(last)));
-    } else {
-        let mut x = rect.left();
-        while x <= rect.right() + 2.0 {
-            points.push(pos2(x, values.y(c.at(axis.t(x)))));
-            x += 2.0;
-        }
-    }
-    painter.add(egui::Shape::line(points, stroke));
-}
-
-/// The slope at a selected key, on either side.
-fn tangent(painter: &egui::Painter, axis: &Axis, values: &Values, c: &Channel<'_>, k: usize, at: Pos2) {
-    let (t, v) = c.key(k);
-    let small = (axis.scale * 0.5).max(1e-5);
-    for side in [-1.0, 1.0] {
-        let slope = (c.at(t + side * small) - v) / small;
-        let to = pos2(axis.x(t + side * 30.0 * axis.scale), values.y(v + slope * 30.0 * axis.scale));
-        let arm = (to - at).normalized() * 30.0;
-        if arm.is_finite() && c.of.curve.interpolation() != Interpolation::Hold {
-            painter.line_segment([at, at + arm], Stroke::new(1.0, SELECTED));
-            painter.circle_filled(at + arm, 2.0, SELECTED);
-        }
-    }
-}
-
-/// Lines of round values with their numbers.
-fn levels(painter: &egui::Painter, values: &Values, visuals: &egui::Visuals) {
-    let span = values.high - values.low;
-    let rough = span / f64::from((values.rect.height() / 32.0).max(1.0));
-    let ten = 10f64.powf(rough.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * ten).find(|s| *s >= rough).unwrap_or(ten);
-    let count = (span / step).clamp(0.0, 60.0) as usize + 2;
-    let first = (values.low / step).floor() * step;
-    let decimals = (-step.log10().floor()).clamp(0.0, 6.0) as usize;
-    for v in (0..count).map(|i| first + i as f64 * step) {
-        let y = values.y(v);
-        if values.rect.y_range().contains(y) {
-            let faint =
-                visuals.weak_text_color().gamma_multiply(if v.abs() < step * 1e-6 { 0.5 } else { 0.15 });
-            painter.hline(values.rect.x_range(), y, Stroke::new(1.0, faint));
-            let at = pos2(values.rect.left() - 4.0, y);
-            let text = format!("{:.decimals$}", v + 0.0);
-            painter.text(
-                at,
-                Align2::RIGHT_CENTER,
-                text,
-                FontId::proportional(10.0),
-                visuals.weak_text_color(),
-            );
-        }
-    }
-}
-
-fn legend(painter: &egui::Painter, axis: &Axis, channels: &[Channel<'_>]) {
-    let lines = ((axis.rect.height() - 20.0) / 13.0).max(1.0) as usize;
-    for (i, c) in channels.iter().take(lines).enumerate() {
-        let at = axis.rect.left_top() + Vec2::new(8.0, 4.0 + 13.0 * i as f32);
-        let unit = if c.unit == 1.0 { "" } else { " °" };
-        painter.text(at, Align2::LEFT_TOP, format!("{}{unit}", c.name), FontId::proportional(11.0), c.color);
-    }
-    if channels.len() > lines {
-        let at = axis.rect.left_top() + Vec2::new(8.0, 4.0 + 13.0 * lines as f32);
-        let text = format!("and {} more", channels.len() - lines);
-        painter.text(at, Align2::LEFT_TOP, text, FontId::proportional(11.0), Color32::GRAY);
-    }
-}
-
-/// Said where it bites: at θ₂ = 0 the two twists are one.
-pub fn singular(state: &State) -> Option<String> {
-    let bone = state.selection.active()?;
-    state.track_of(&Target::Xzx(bone)).or(state.loose.get(&bone).and_then(|l| l.theta).map(|_| 0))?;
-    let theta = state.theta(bone);
-    let name = state.document.skeleton().name(bone);
-    (theta.y.sin().abs() < 0.05).then(|| {
-        let sum = if theta.y.cos() > 0.0 { theta.x + theta.z } else { theta.z - theta.x };
-        let sign = if theta.y.cos() > 0.0 { "θ1 + θ3" } else { "θ3 − θ1" };
-        format!(
-            "{name}: θ2 is near {:.0}°, so θ1 and θ3 turn about one axis: only {sign} = {:.1}° shows",
-            theta.y.to_degrees(),
-            sum.to_degrees()
-        )
-    })
+fn small(text: &str, on: bool) -> egui::Button<'_> {
+    egui::Button::new(egui::RichText::new(text).size(10.0))
+        .small()
+        .wrap_mode(egui::TextWrapMode::Extend)
+        .selected(on)
 }

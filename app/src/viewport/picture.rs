@@ -1,0 +1,230 @@
+//! The character as a texture: drawn by the library, and only when something changed.
+
+use super::Cost;
+use super::orbit::Orbit;
+use crate::state::{BoneStyle, EditClip, Loose, Quality, State};
+use egui::{Color32, ColorImage, TextureHandle, TextureOptions};
+use glam::DVec3;
+use sinew::asset::Asset;
+use sinew::fk::Posed;
+use sinew::frames::{BonesDesc, Live, Look};
+use sinew::image::Rgba8;
+use sinew::render::Settings;
+use sinew::skeleton::BoneId;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Ghosts of other moments, and how much of each is seen.
+const GHOSTS: [(i32, u8); 6] = [(-3, 50), (3, 50), (-2, 80), (2, 80), (-1, 120), (1, 120)];
+/// Frames between two of them.
+const GHOST_STEP: f64 = 4.0;
+
+/// Pictures of one state from one place.
+#[derive(Default)]
+pub struct Picture {
+    live: Option<(Arc<Asset>, Live)>,
+    buffer: Rgba8,
+    /// Far ghosts first, with their tints.
+    pub ghosts: Vec<(TextureHandle, Color32)>,
+    /// The character.
+    pub body: Option<TextureHandle>,
+    /// Its bones.
+    pub bones: Option<TextureHandle>,
+    of: Option<Seen>,
+    /// Pictures drawn since the start.
+    pub drawn: u64,
+}
+
+/// All that a picture depends on; whatever else changes, it is not drawn again.
+#[derive(Clone)]
+struct Seen {
+    clip: Arc<EditClip>,
+    time: f64,
+    frame: f64,
+    loose: BTreeMap<BoneId, Loose>,
+    chosen: Vec<BoneId>,
+    view: (Quality, BoneStyle, bool),
+    orbit: Orbit,
+    size: [usize; 2],
+    moving: bool,
+}
+
+impl Seen {
+    fn of(state: &State, orbit: &Orbit, size: [usize; 2], moving: bool) -> Self {
+        let v = &state.view;
+        Self {
+            clip: state.document.clips[state.clip].clone(),
+            time: state.time,
+            frame: state.frame_seconds(),
+            loose: state.loose.clone(),
+            chosen: state.selection.bones.clone(),
+            view: (v.quality, v.bones, v.onion),
+            orbit: *orbit,
+            size,
+            moving,
+        }
+    }
+
+    fn same(&self, o: &Self) -> bool {
+        Arc::ptr_eq(&self.clip, &o.clip)
+            && (self.time, self.frame, self.view, self.orbit) == (o.time, o.frame, o.view, o.orbit)
+            && (self.size, self.moving) == (o.size, o.moving)
+            && self.loose == o.loose
+            && self.chosen == o.chosen
+    }
+}
+
+impl Picture {
+    /// Where the bones stand; `None` before the first picture.
+    pub fn posed(&self) -> Option<&Posed> {
+        self.live.as_ref().map(|l| l.1.posed())
+    }
+
+    /// The asset is another one now.
+    pub fn is_stale(&self, state: &State) -> bool {
+        self.live.as_ref().is_none_or(|l| !Arc::ptr_eq(&l.0, &state.document.asset))
+    }
+
+    /// A box around the character as it was drawn last, or around its bones.
+    pub fn bounds(&self) -> Option<[DVec3; 2]> {
+        let (asset, live) = self.live.as_ref()?;
+        let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+        let grow = |[low, high]: [DVec3; 2], p: DVec3| [low.min(p), high.max(p)];
+        let points = live.positions().flatten().filter(|p| p.is_finite());
+        let mesh = points.map(|p| live.center() + p.as_dvec3()).fold(none, grow);
+        let skeleton = asset.character.skeleton();
+        let ends = skeleton.ids().flat_map(|b| super::ends(skeleton, live.posed(), b));
+        let all = if mesh[0].is_finite() { mesh } else { ends.fold(none, grow) };
+        all[0].is_finite().then_some(all)
+    }
+
+    /// Make ready for an asset, posed as it is now.
+    pub fn open(&mut self, state: &State) {
+        let asset = state.document.asset.clone();
+        let mut live = Live::new(&asset, Look::default());
+        live.pose(&asset, &state.pose());
+        *self = Self { live: Some((asset, live)), drawn: self.drawn, ..Self::default() };
+    }
+
+    /// The bone below a pixel of the pane.
+    pub fn bone_at(&mut self, orbit: &Orbit, size: [usize; 2], at: [usize; 2]) -> Option<BoneId> {
+        let (asset, live) = self.live.as_mut()?;
+        let camera = orbit.camera(live.center());
+        let settings = Settings { width: size[0], height: size[1], samples: 1, threads: 1 };
+        live.bone_at(asset, &camera, &settings, at)
+    }
+
+    /// Draw anew if anything changed: the document, the pose, the view, the camera, the size, or that it came to rest.
+    pub fn update(
+        &mut self,
+        ctx: &egui::Context,
+        state: &State,
+        orbit: &Orbit,
+        size: [usize; 2],
+        moving: bool,
+    ) -> Option<Cost> {
+        if self.is_stale(state) {
+            self.open(state);
+        }
+        // Edges are smoothed at rest, or always.
+        let quality = state.view.quality;
+        let moving = moving && quality == Quality::Normal;
+        let now = Seen::of(state, orbit, size, moving);
+        if size.contains(&0) || self.of.as_ref().is_some_and(|of| of.same(&now)) {
+            return None;
+        }
+        self.of = Some(now);
+        self.drawn += 1;
+        let shrink = if quality == Quality::Draft { 2 } else { 1 };
+        let [width, height] = size.map(|s| s.div_ceil(shrink).min(Settings::MAX_SIZE));
+        let samples = if moving || quality == Quality::Draft { 1 } else { 4 };
+        let threads = std::thread::available_parallelism().map_or(1, |n| n.get().min(8));
+        let settings = Settings { width, height, samples, threads };
+        self.draw(ctx, state, orbit, &settings)
+    }
+
+    fn draw(
+        &mut self,
+        ctx: &egui::Context,
+        state: &State,
+        orbit: &Orbit,
+        settings: &Settings,
+    ) -> Option<Cost> {
+        let Self { live, buffer, ghosts, body, bones, .. } = self;
+        let (asset, live) = live.as_mut()?;
+        let camera = orbit.camera(live.center());
+        let mut cost = Cost { pixels: settings.width * settings.height, ..Cost::default() };
+        let take = |live: &mut Live, pose: &dyn Fn() -> sinew::pose::Pose, cost: &mut Cost| {
+            let start = std::time::Instant::now();
+            let pose = pose();
+            let sampled = start.elapsed();
+            let stats = live.pose(asset, &pose);
+            cost.evaluate_ms += ms(sampled + stats.times.pose);
+            cost.skin_ms += ms(stats.times.deform);
+            cost.vertices += stats.vertices;
+        };
+        let paint = |live: &mut Live, cost: &mut Cost, buffer: &mut Rgba8| {
+            let start = std::time::Instant::now();
+            let stats = live.draw(asset, &camera, [0.0; 4], settings, buffer);
+            cost.draw_ms += ms(start.elapsed());
+            cost.triangles += stats.drawn as usize;
+        };
+
+        let wanted = if state.view.onion { &GHOSTS[..] } else { &[] };
+        let step = GHOST_STEP * state.frame_seconds();
+        let range = state.active().range;
+        let mut used = 0;
+        for (k, share) in wanted {
+            let t = state.time + f64::from(*k) * step;
+            if t < range.start - 1e-9 || t > range.end + 1e-9 {
+                continue;
+            }
+            take(live, &|| state.pose_at(t), &mut cost);
+            paint(live, &mut cost, buffer);
+            let color = if *k < 0 { [70, 120, 255] } else { [255, 140, 40] };
+            for p in buffer.data.chunks_exact_mut(4) {
+                (0..3).for_each(|c| p[c] = ((u16::from(p[c]) + 3 * color[c]) / 4) as u8);
+            }
+            let tint = Color32::from_white_alpha(*share);
+            let mut slot = ghosts.get(used).map(|g| g.0.clone());
+            upload(ctx, "ghost", buffer, &mut slot);
+            ghosts.truncate(used);
+            ghosts.extend(slot.map(|s| (s, tint)));
+            used += 1;
+        }
+        ghosts.truncate(used);
+
+        take(live, &|| state.pose(), &mut cost);
+        paint(live, &mut cost, buffer);
+        upload(ctx, "body", buffer, body);
+        if matches!(state.view.bones, BoneStyle::Pyramids | BoneStyle::XRay) {
+            let desc = BonesDesc { selected: state.selection.bones.clone() };
+            let start = std::time::Instant::now();
+            live.draw_bones(asset, &desc, &camera, settings, buffer);
+            cost.draw_ms += ms(start.elapsed());
+            upload(ctx, "bones", buffer, bones);
+        } else {
+            *bones = None;
+        }
+        Some(cost)
+    }
+}
+
+fn ms(of: std::time::Duration) -> f32 {
+    of.as_secs_f32() * 1e3
+}
+
+/// Put a picture into a texture, premultiplied; most pixels are either there or not.
+fn upload(ctx: &egui::Context, name: &str, picture: &Rgba8, slot: &mut Option<TextureHandle>) {
+    let pixel = |p: &[u8]| match p[3] {
+        0 => Color32::TRANSPARENT,
+        255 => Color32::from_rgb(p[0], p[1], p[2]),
+        _ => Color32::from_rgba_unmultiplied(p[0], p[1], p[2], p[3]),
+    };
+    let pixels = picture.data.chunks_exact(4).map(pixel).collect();
+    let image = ColorImage::new([picture.width, picture.height], pixels);
+    match slot {
+        Some(texture) => texture.set(image, TextureOptions::LINEAR),
+        None => *slot = Some(ctx.load_texture(name, image, TextureOptions::LINEAR)),
+    }
+}

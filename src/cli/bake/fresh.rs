@@ -1,0 +1,71 @@
+//! Files that do not come from a glTF file: rigs of ours, and glTF of other formats.
+
+use super::report::Done;
+use crate::cli::{Failure, say::Say};
+use serde_json::{Map, Value};
+use sinew::clip::{Clip, Track};
+use sinew::image::Rgba8;
+use sinew::io::picture::{PngLevel, encode_png};
+use sinew::io::{Import, gltf, rig_json};
+use sinew::scene::Texture;
+use std::path::Path;
+
+/// A glTF file of an import of any format.
+pub(super) fn gltf(
+    input: &Path,
+    import: &Import,
+    done: &[Done],
+    extras: Map<String, Value>,
+    say: &Say,
+) -> Result<gltf::Rewritten, Failure> {
+    let pictures = import.asset.textures.iter().map(png).collect::<Result<Vec<_>, _>>()?;
+    let clips: Vec<Clip> = done.iter().map(|d| with_slopes(&d.baked.clip)).collect();
+    let new = clips.iter().zip(done);
+    let new: Vec<gltf::NewClip> =
+        new.map(|(clip, d)| gltf::NewClip { clip, short: &d.baked.short, replaces: None }).collect();
+    let bad = |e: gltf::GltfError| Failure::Input(format!("{}: {e}", input.display()));
+    let (out, warnings) = gltf::write(&import.asset, &pictures, &new, extras).map_err(bad)?;
+    say.warnings(input, &warnings);
+    Ok(out)
+}
+
+/// glTF knows no Catmull-Rom.
+fn with_slopes(clip: &Clip) -> Clip {
+    let track = |t: &Track| Track { target: t.target.clone(), curve: t.curve.with_slopes() };
+    Clip { name: clip.name.clone(), tracks: clip.tracks.iter().map(track).collect() }
+}
+
+fn png(texture: &Texture) -> Result<Vec<u8>, Failure> {
+    let [width, height] = [texture.width(), texture.height()].map(|n| n as usize);
+    let picture = Rgba8 { width, height, data: texture.levels()[0].clone() };
+    encode_png(&picture, PngLevel::Balanced).map_err(|e| Failure::Run(e.to_string()))
+}
+
+/// A rig, its poses and its pictures: their names, the rig last, and what is in them.
+pub(super) fn rig(
+    output: &Path,
+    input: &Path,
+    import: &Import,
+    done: &[Done],
+    say: &Say,
+) -> Result<Vec<(String, Vec<u8>)>, Failure> {
+    let stem = output.file_stem().unwrap_or_default().to_string_lossy();
+    let names: Vec<String> = (0..import.asset.textures.len()).map(|i| format!("{stem}.{i}.png")).collect();
+    let mut rig = rig_json::export(&stem, &import.asset, &names);
+    let clips: Vec<Clip> = done.iter().map(|d| d.baked.clip.clone()).collect();
+    let poses = rig_json::export_poses(&import.asset.character, &clips);
+    say.warnings(input, &rig.warnings);
+    say.warnings(input, &poses.warnings);
+    let mut files = vec![];
+    for (name, texture) in names.iter().zip(&import.asset.textures) {
+        if rig.document.materials.iter().any(|m| m.texture.as_ref() == Some(name)) {
+            files.push((name.clone(), png(texture)?));
+        }
+    }
+    let beside = format!("{stem}.poses.json");
+    rig.document.poses = Some(vec![beside.clone()]);
+    files.push((beside, poses.document.to_text().into_bytes()));
+    let name = output.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    files.push((name, rig.document.to_text().into_bytes()));
+    Ok(files)
+}
