@@ -36,17 +36,7 @@ fn tube() -> (Character, Vec<BoneId>) {
         m.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
     };
     for k in 0..8 {
-        (0..4).for_each(|c| {
-            quad(
-                [at(k, c), at(k, c + 1), at(k + 1, c + 1), at(k + 1, c)]
-                    .map(|p| p)
-                    .into_iter()
-                    .rev()
-                    .collect::<Vec<_>>()
-                    .try_into()
-                    .unwrap(),
-            )
-        });
+        (0..4).for_each(|c| quad([at(k, c), at(k, c + 1), at(k + 1, c + 1), at(k + 1, c)]));
     }
     quad([at(0, 0), at(0, 3), at(0, 2), at(0, 1)]);
     quad([at(8, 0), at(8, 1), at(8, 2), at(8, 3)]);

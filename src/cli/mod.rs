@@ -11,6 +11,7 @@ mod say;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use say::Say;
+use sinew::clip::Clip;
 use sinew::io::scene::{Setting, ours};
 use sinew::io::{self, Import, Options};
 use std::path::{Path, PathBuf};
@@ -190,12 +191,27 @@ fn load_posed(path: &Path, poses: Option<&PathBuf>, options: Options, say: &Say)
                 &"a motion capture stands on a skeleton of its own; expected poses (`sinew_poses`)",
             ));
         }
-        let clips = io::rig_json::poses_from_bytes(&bytes, &import.asset.character);
-        let clips = clips.map_err(|e| bad(&e))?;
+        let clips = match packed_clips(file, &bytes, &import, say)? {
+            Some(clips) => clips,
+            None => io::rig_json::poses_from_bytes(&bytes, &import.asset.character).map_err(|e| bad(&e))?,
+        };
         let character = std::mem::take(&mut import.asset.character);
         import.asset.character = character.with_clips(clips).map_err(|e| bad(&e))?;
     }
     Ok(import)
+}
+
+/// The clips of packed bytes on the import's bones; none if the bytes are something else.
+fn packed_clips(file: &Path, bytes: &[u8], import: &Import, say: &Say) -> Result<Option<Vec<Clip>>, Failure> {
+    if !bytes.starts_with(io::sinew_clip::MAGIC) {
+        return Ok(None);
+    }
+    let packed =
+        io::sinew_clip::read(bytes).map_err(|e| Failure::Input(format!("{}: {e}", file.display())))?;
+    let mut warnings = vec![];
+    let clips = packed.clips(&import.asset.character, &mut warnings);
+    say.warnings(file, &warnings);
+    Ok(Some(clips))
 }
 
 /// The clip that `--clip` names: by name, else by index; by default a scene's own, else the first, `None` without clips.

@@ -94,6 +94,11 @@ impl Job {
         self.made.as_ref().map_or(0, |m| m.0.lanes.iter().map(Vec::len).sum())
     }
 
+    /// Moments that numbers are stored for.
+    pub fn keys(&self) -> usize {
+        self.made.as_ref().map_or(0, |m| m.0.lanes.first().map_or(1, Vec::len))
+    }
+
     /// The form of fewest bits within `allowed`.
     pub fn make(&mut self, allowed: f64) {
         self.made = None;

@@ -15,7 +15,7 @@ use job::Job;
 pub struct PackedBake {
     /// Plays from its bytes.
     pub packed: Packed,
-    /// Keys and bytes before, numbers and bytes after.
+    /// Keys and bytes, before and after: here a key is a moment that numbers are stored for.
     pub report: Report,
 }
 
@@ -40,7 +40,7 @@ pub fn pack(character: &Character, clip: &Clip, desc: &BakeDesc) -> Result<Packe
         let (ceiling, moments) = (verdict.ceiling, verdict.moments);
         worst = verdict.worst;
         if ceiling <= 1.0 {
-            let keys = [clip.key_count(), search.numbers()];
+            let keys = [clip.key_count(), search.jobs.iter().map(Job::keys).sum()];
             let bytes = [plan::bytes(clip, &[]), packed.bytes().len()];
             return Ok(PackedBake { packed, report: Report { worst, ceiling, moments, keys, bytes } });
         }
@@ -187,10 +187,6 @@ impl<'a> Search<'a> {
     fn make(&mut self, i: usize) {
         let job = &mut self.jobs[i];
         job.make(self.share * job.weight * self.tolerance / job.lever);
-    }
-
-    fn numbers(&self) -> usize {
-        self.jobs.iter().map(Job::numbers).sum()
     }
 
     fn packed(&self) -> Option<Packed> {

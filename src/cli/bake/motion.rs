@@ -1,6 +1,6 @@
 //! Clips of other files: captures, and animations for another skeleton.
 
-use crate::cli::{Failure, load, say::Say};
+use crate::cli::{Failure, load, packed_clips, say::Say};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use sinew::bake::retarget::{self, Map};
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(super) struct Motion {
-    /// Take the clips from this file instead, a capture (.bvh) or whatever has clips, onto the input's bones: by --retarget, then by their
+    /// Take the clips from this file instead, a capture (.bvh), packed clips (.sinew) or whatever has clips, onto the input's bones: by --retarget, then by their
     /// names. May be given several times.
     #[arg(long, value_name = "FILE")]
     motion: Vec<PathBuf>,
@@ -58,6 +58,15 @@ impl Motion {
         let mut clips = vec![];
         let file = self.retarget.as_deref().map(read).transpose()?;
         for path in &self.motion {
+            let bytes =
+                io::read_file(path).map_err(|e| Failure::Input(format!("{}: {e}", path.display())))?;
+            if let Some(packed) = packed_clips(path, &bytes, import, say)? {
+                told.extend(
+                    packed.iter().map(|c| json!({"file": path.display().to_string(), "clip": c.name})),
+                );
+                clips.extend(packed);
+                continue;
+            }
             let motion = load(path, Options::default(), say)?;
             let (source, target) = (&motion.asset.character, &import.asset.character);
             if source.clips().is_empty() {
