@@ -376,6 +376,7 @@ impl<'v> Straight<'v> {
     }
 
     /// Shoemake's slerp, not normalised.
+    #[inline]
     fn arc(&self, u: f64) -> [f64; 4] {
         let part = |u: f64| {
             // sin(uθ)/sin θ by its series: the next term is below 1e-8 here.
@@ -406,6 +407,7 @@ impl<'v> Straight<'v> {
 }
 
 /// The chord between a quaternion, once it is of unit length, and one of the nearer of a unit one's two signs, squared.
+#[inline]
 fn chord2(q: [f64; 4], value: &[f32]) -> f64 {
     let scale = q.iter().map(|c| c * c).sum::<f64>().sqrt().max(1e-30).recip();
     let dot: f64 = (0..4).map(|c| q[c] * value[c] as f64).sum();
