@@ -196,6 +196,9 @@ impl std::fmt::Display for Rates {
 const USUAL: [f64; 14] =
     [12.0, 15.0, 24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 90.0, 100.0, 120.0, 240.0, 480.0, 960.0];
 
+/// Searches that are made again with the moments that were missed.
+const SEARCHES: usize = 4;
+
 /// Ends of a loop that agree to this part of their track, or radians, are made equal.
 const SEAM: f64 = 1e-3;
 
@@ -241,19 +244,26 @@ fn bake_from(
     gauge.enter(Stage::Search);
     let mut baked = plan.search(&gauge);
     gauge.enter(Stage::Check);
-    for _ in 0..8 {
-        let Verdict { worst, ceiling, moments } = times::verify(&gauge, clip, &baked.clip);
+    for round in 0..12 {
+        let Verdict { worst, ceiling, moments, over } = times::verify(&gauge, clip, &baked.clip);
         let report = &mut baked.report;
         (report.worst, report.ceiling, report.moments) = (worst, ceiling, moments);
         if ceiling <= 1.0 {
             return Ok(baked);
         }
-        // What hid between the moments of the search: aim a little lower.
+        // What hid between the moments of the search is searched with.
+        if round < SEARCHES && !over.is_empty() {
+            gauge.enter(Stage::Search);
+            baked = plan.search_with(&gauge, over);
+            gauge.enter(Stage::Check);
+            continue;
+        }
+        // Or else: aim a little lower.
         let over = if worst.share() > 1.0 { worst.share() } else { ceiling };
         baked = plan.within(&gauge, (0.95 / over).min(0.9));
     }
     let plain = plan.untouched();
-    let Verdict { worst, ceiling, moments } = times::verify(&gauge, clip, &plain.clip);
+    let Verdict { worst, ceiling, moments, .. } = times::verify(&gauge, clip, &plain.clip);
     if ceiling <= 1.0 {
         return Ok(Baked { report: Report { worst, ceiling, moments, ..plain.report }, ..plain });
     }

@@ -132,6 +132,15 @@ impl<'a> Plan<'a> {
         self.finish()
     }
 
+    /// The same with more moments.
+    pub fn search_with(&mut self, gauge: &Gauge, more: Vec<f64>) -> Baked {
+        self.moments.extend(more);
+        self.moments.sort_by(f64::total_cmp);
+        self.moments.dedup();
+        self.jobs.iter_mut().for_each(|j| j.weight = 1.0);
+        self.search(gauge)
+    }
+
     /// Give single tracks more where the worst vertex does not notice.
     fn widen(&mut self, gauge: &Gauge, looks: &Looks, aim: f64) {
         let mut work = SEARCH_WORK / (self.vertices * self.moments.len()).max(1);

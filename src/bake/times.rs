@@ -13,6 +13,9 @@ const BRACKET: f64 = 1.02;
 /// Rounds of halving that only bring the bound closer, and gaps in each.
 const CLOSER: [usize; 2] = [12, 64];
 
+/// Moments over the limit that are told of.
+const OVER: usize = 64;
+
 /// Halvings of a gap before it is given up: 2⁻³⁰ of it.
 const DEEPEST: u32 = 30;
 
@@ -35,7 +38,7 @@ pub(super) fn coarse(clip: &Clip, most: usize) -> Vec<f64> {
 }
 
 /// What two clips do, between two bounds.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Verdict {
     /// The worst that was measured.
     pub worst: Worst,
@@ -43,6 +46,8 @@ pub(super) struct Verdict {
     pub ceiling: f64,
     /// Moments at which vertices were compared.
     pub moments: usize,
+    /// Those at which the limit is exceeded by most.
+    pub over: Vec<f64>,
 }
 
 /// Two moments and what is known between them.
@@ -81,6 +86,9 @@ impl Verdict {
         let found = gauge.profile(clips[0], clips[1], times);
         self.moments += times.len();
         self.worst = found.iter().copied().fold(self.worst, Worst::worse);
+        let mut over: Vec<&Worst> = found.iter().filter(|w| w.share() > 1.0).collect();
+        over.sort_by(|a, b| b.share().total_cmp(&a.share()).then(a.time.total_cmp(&b.time)));
+        self.over.extend(over.iter().take(OVER).map(|w| w.time));
         found.iter().map(Worst::share).collect()
     }
 

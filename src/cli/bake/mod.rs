@@ -70,9 +70,10 @@ pub struct Args {
     /// Only this clip, by name or index; all of them by default.
     #[arg(long, value_name = "NAME|INDEX")]
     clip: Option<String>,
-    /// What there is to be little of: bytes of the file, or keys to edit, which cubic curves need fewer of.
-    #[arg(long, value_name = "bytes|keys", default_value = "bytes", value_parser = fewest)]
-    fewest: Goal,
+    /// What there is to be little of: bytes of the file, or keys to edit, which cubic curves need fewer of. Keys for rigs (.json), bytes
+    /// otherwise.
+    #[arg(long, value_name = "bytes|keys", value_parser = fewest)]
+    fewest: Option<Goal>,
     /// Keep rotations as 32-bit floating point.
     #[arg(long)]
     no_quantize: bool,
@@ -204,7 +205,11 @@ fn desc(args: &Args, import: &Import) -> Result<(BakeDesc, f64), Failure> {
         },
         pins: pins.collect::<Result<_, _>>()?,
         quantize: !args.no_quantize,
-        goal: args.fewest,
+        goal: args.fewest.unwrap_or(if to::is_rig(Path::new(&args.output)) {
+            Goal::Keys
+        } else {
+            Goal::Bytes
+        }),
         threads,
         ..BakeDesc::default()
     };

@@ -25,13 +25,19 @@ pub(super) fn bone_of(import: &Import, b: &Baked) -> String {
 
 pub(super) fn line(import: &Import, done: &Done, diagonal: f64) -> String {
     let (clip, r) = (&done.edited.clip, &done.baked.report);
-    format!(
-        "{}: {} → {} keys, {} → {} bytes; at most {:.4} mm off ({:.4}% of the diagonal), at {:.3} s on {}",
+    let made = format!(
+        "{}: {} → {} keys, {} → {} bytes",
         say::name(&clip.name),
         r.keys[0],
         r.keys[1],
         r.bytes[0],
-        r.bytes[1],
+        r.bytes[1]
+    );
+    if r.worst.spot.is_none() && r.ceiling == 0.0 {
+        return format!("{made}; nothing is off");
+    }
+    format!(
+        "{made}; at most {:.4} mm off ({:.4}% of the diagonal), at {:.3} s on {}",
         1e3 * r.ceiling * r.worst.limit,
         100.0 * r.ceiling * r.worst.limit / diagonal.max(1e-30),
         r.worst.time,
