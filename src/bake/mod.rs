@@ -199,6 +199,9 @@ const USUAL: [f64; 14] =
 /// Searches that are made again with the moments that were missed.
 const SEARCHES: usize = 4;
 
+/// What is over by less is made up for by a smaller share.
+const LITTLE: f64 = 1.06;
+
 /// Ends of a loop that agree to this part of their track, or radians, are made equal.
 const SEAM: f64 = 1e-3;
 
@@ -252,7 +255,7 @@ fn bake_from(
             return Ok(baked);
         }
         // What hid between the moments of the search is searched with.
-        if round < SEARCHES && !over.is_empty() {
+        if round < SEARCHES && worst.share() > LITTLE {
             gauge.enter(Stage::Search);
             baked = plan.search_with(&gauge, over);
             gauge.enter(Stage::Check);
