@@ -1,7 +1,7 @@
 //! Buffer views packed by EXT_meshopt_compression, written: each accessor in a view of its own, packed where that is smaller.
 
 use super::error::{GltfError, Result};
-use super::rewrite::{Rewritten, packing, primitives, renumber, source, view_places};
+use super::rewrite::{Rewritten, fallback_buffer, packing, primitives, renumber, source, view_places};
 use meshoptimizer_rs::codec;
 use meshoptimizer_rs::{Limits, Workspace};
 use serde_json::{Value, json};
@@ -73,11 +73,11 @@ impl Rewritten {
         if views.is_empty() {
             return Ok(());
         }
-        self.json.insert("bufferViews".into(), views.into());
         let mut buffers = vec![json!({"byteLength": self.bin.len()})];
         if fallback > 0 {
-            buffers.push(json!({"byteLength": fallback, "extensions": {NAME: {"fallback": true}}}));
+            buffers.push(fallback_buffer(&views, fallback));
         }
+        self.json.insert("bufferViews".into(), views.into());
         self.json.insert("buffers".into(), buffers.into());
         for key in ["extensionsUsed", "extensionsRequired"].into_iter().filter(|_| any) {
             let list = self.json.entry(key).or_insert(json!([]));
@@ -85,6 +85,8 @@ impl Rewritten {
                 list.push(NAME.into());
             }
         }
+        // Empty lists are against the specification.
+        self.json.retain(|_, v| v.as_array().is_none_or(|a| !a.is_empty()));
         Ok(())
     }
 

@@ -547,6 +547,13 @@ pub(super) fn packing(view: &Value) -> Option<&'static str> {
     places.into_iter().find(|p| view.pointer(p).is_some())
 }
 
+/// A buffer without data, for the unpacked bytes of packed views, by the names of the extensions that pack them.
+pub(super) fn fallback_buffer(views: &[Value], length: u64) -> Value {
+    let names = views.iter().filter_map(packing).filter_map(|p| p.rsplit('/').next());
+    let extensions: Map<String, Value> = names.map(|n| (n.to_owned(), json!({"fallback": true}))).collect();
+    json!({"byteLength": length, "extensions": extensions})
+}
+
 /// What names a view's bytes: buffer, offset and length.
 pub(super) fn source(view: &mut Value) -> &mut Value {
     match packing(view) {
@@ -609,9 +616,7 @@ fn repack(json: &mut Map<String, Value>, doc: &Document) -> Vec<u8> {
     }
     let mut buffers = vec![json!({"byteLength": bin.len()})];
     if fallback > 0 {
-        buffers.push(
-            json!({"byteLength": fallback, "extensions": {"EXT_meshopt_compression": {"fallback": true}}}),
-        );
+        buffers.push(fallback_buffer(list(json, "bufferViews"), fallback));
     }
     if bin.is_empty() {
         json.remove("buffers")
