@@ -8,6 +8,7 @@ use sinew::fk;
 use sinew::io::gltf::{self, NewClip};
 use sinew::io::{Import, Options};
 use sinew::math::Trs;
+use sinew::math::spline::Tangents;
 use sinew::mesh::{Mesh, MeshData};
 use sinew::skeleton::{BoneDesc, BoneId, Skeleton};
 
@@ -201,7 +202,7 @@ fn file() -> (Vec<u8>, Import) {
             "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}]}],
     });
     let map = json.as_object().unwrap().clone();
-    let bytes = gltf::Rewritten { json: map, bin: floats }.glb();
+    let bytes = gltf::Rewritten { json: map, bin: floats, ..Default::default() }.glb();
     let import = gltf::import_bytes(&bytes, None, "file.glb", &Options::default()).unwrap();
     (bytes, import)
 }
@@ -214,7 +215,8 @@ fn a_file_with_other_clips_keeps_everything_else() {
     let baked = bake(character, &character.clips()[0], &desc).unwrap();
     let new = NewClip { clip: &baked.clip, short: &baked.short, replaces: Some(0) };
     let extras = serde_json::json!({"sinew": {"tolerance": 1e-4}}).as_object().unwrap().clone();
-    let out = gltf::with_clips(&bytes, None, "file.glb", &import, &[new], extras).unwrap();
+    let change = gltf::Change { clips: &[new], extras, ..Default::default() };
+    let out = gltf::changed(&bytes, None, "file.glb", &import, change).unwrap();
     assert_eq!(out.json["extras"]["keep"], serde_json::json!([1, 2]));
     assert_eq!(
         out.json["asset"]["extras"],
@@ -226,6 +228,36 @@ fn a_file_with_other_clips_keeps_everything_else() {
     let again = gltf::import_bytes(&out.glb(), None, "out.glb", &Options::default()).unwrap();
     assert!(again.warnings.is_empty(), "{:?}", again.warnings);
     assert_eq!(again.asset.character.clips()[0], baked.clip);
+}
+
+#[test]
+fn slopes_by_a_rule_are_written_as_numbers_and_notes_find_their_clips() {
+    let (bytes, import) = file();
+    let rule = Interpolation::CatmullRom(Tangents::ThreePoint);
+    let values = vec![0.0, 0.0, 0.0, 1.0, 2.0, 0.0, 3.0, 0.0, 1.0, 2.0, 1.0, 0.5];
+    let curve = Curve::new(vec![0.0, 0.3, 1.0, 1.2], values, 3, rule).unwrap();
+    let moving =
+        Clip { name: "curved".into(), tracks: vec![Track { target: Target::Translation(BoneId(0)), curve }] };
+    let still = Clip { name: "still".into(), tracks: vec![] };
+    let new = [&still, &moving].map(|clip| NewClip { clip, short: &[], replaces: None });
+    let change = gltf::Change { clips: &new, ..Default::default() };
+    let mut out = gltf::changed(&bytes, None, "file.glb", &import, change).unwrap();
+    // What moves nothing has no animation; notes on it go nowhere, and the others' where they belong.
+    out.note(0, "what", "still".into());
+    out.note(1, "what", "curved".into());
+    assert_eq!(out.json["animations"].as_array().unwrap().len(), 1);
+    assert_eq!(out.json["animations"][0]["extras"]["sinew"]["what"], "curved");
+
+    let back = gltf::import_bytes(&out.glb(), None, "file.glb", &Options::default()).unwrap();
+    let character = &back.asset.character;
+    for t in (0..=120).map(|k| k as f64 * 0.01) {
+        let places = [&moving, &character.clips()[0]].map(|clip| {
+            let mut pose = character.rest_pose();
+            clip.sample(character.skeleton(), t, &mut pose);
+            pose.locals[0].translation
+        });
+        assert!(places[0].distance(places[1]) < 1e-6, "{t}: {places:?}");
+    }
 }
 
 #[test]

@@ -50,7 +50,7 @@ impl File {
         map.insert("accessors".into(), self.accessors.into());
         map.insert("bufferViews".into(), self.views.into());
         map.insert("buffers".into(), json!([{"byteLength": self.bin.len()}]));
-        Rewritten { json: map, bin: self.bin }.glb()
+        Rewritten { json: map, bin: self.bin, ..Default::default() }.glb()
     }
 }
 

@@ -206,5 +206,5 @@ fn figure(bones: usize, vertices: usize, keys: usize) -> Vec<u8> {
         "bufferViews": views,
         "buffers": [{"byteLength": bin.len()}],
     });
-    Rewritten { json: json.as_object().expect("an object").clone(), bin }.glb()
+    Rewritten { json: json.as_object().expect("an object").clone(), bin, ..Default::default() }.glb()
 }

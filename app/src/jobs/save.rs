@@ -4,7 +4,7 @@ use super::open::{Kind, Source, named};
 use sinew::asset::Asset;
 use sinew::bake::{BakeDesc, Metric, xzx};
 use sinew::character::Character;
-use sinew::clip::{Clip, Interpolation, Target};
+use sinew::clip::{Clip, Target};
 use sinew::image::Rgba8;
 use sinew::io::picture::{AtomicFile, Folder, PngLevel, encode_png};
 use sinew::io::{self, Options, Warning, gltf, rig_json};
@@ -105,20 +105,12 @@ pub fn desc(character: &Character) -> BakeDesc {
 
 /// A clip in the words that glTF has, and which tracks are short.
 fn for_gltf(character: &Character, clip: &Clip) -> Result<(Clip, Vec<bool>), String> {
-    let plain = |c: &Clip| {
-        c.tracks.iter().all(|t| {
-            !matches!(t.target, Target::Xzx(_))
-                && !matches!(t.curve.interpolation(), Interpolation::CatmullRom(_))
-        })
-    };
-    if plain(clip) {
+    if !clip.tracks.iter().any(|t| matches!(t.target, Target::Xzx(_))) {
         return Ok((clip.clone(), vec![]));
     }
     let baked =
         xzx::to_quat(character, clip, &desc(character)).map_err(|e| format!("clip `{}`: {e}", clip.name))?;
-    let mut out = baked.clip;
-    out.tracks.iter_mut().for_each(|t| t.curve = t.curve.with_slopes());
-    Ok((out, baked.short))
+    Ok((baked.clip, baked.short))
 }
 
 /// A glTF file with these clips: the source's own, everything else in it carried through, or a new one.
@@ -150,8 +142,8 @@ pub fn gltf(
                 io::import(&source.path, &Options::default()).map_err(|e| named(&source.path, &e))?;
             let name = source.path.display().to_string();
             let bad = |e: gltf::GltfError| named(&source.path, &e);
-            let mut out = gltf::with_clips(&bytes, Some(folder), &name, &import, &new, Default::default())
-                .map_err(bad)?;
+            let change = gltf::Change { clips: &new, ..Default::default() };
+            let mut out = gltf::changed(&bytes, Some(folder), &name, &import, change).map_err(bad)?;
             out.embed_pictures(Some(folder)).map_err(bad)?;
             (out, vec![])
         }

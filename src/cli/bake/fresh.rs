@@ -3,7 +3,7 @@
 use super::report::Done;
 use crate::cli::{Failure, say::Say};
 use serde_json::{Map, Value};
-use sinew::clip::{Clip, Track};
+use sinew::clip::Clip;
 use sinew::image::Rgba8;
 use sinew::io::picture::{PngLevel, encode_png};
 use sinew::io::{Import, gltf, rig_json};
@@ -19,20 +19,14 @@ pub(super) fn gltf(
     say: &Say,
 ) -> Result<gltf::Rewritten, Failure> {
     let pictures = import.asset.textures.iter().map(png).collect::<Result<Vec<_>, _>>()?;
-    let clips: Vec<Clip> = done.iter().map(|d| with_slopes(&d.baked.clip)).collect();
-    let new = clips.iter().zip(done);
-    let new: Vec<gltf::NewClip> =
-        new.map(|(clip, d)| gltf::NewClip { clip, short: &d.baked.short, replaces: None }).collect();
+    let new: Vec<gltf::NewClip> = done
+        .iter()
+        .map(|d| gltf::NewClip { clip: &d.baked.clip, short: &d.baked.short, replaces: None })
+        .collect();
     let bad = |e: gltf::GltfError| Failure::Input(format!("{}: {e}", input.display()));
     let (out, warnings) = gltf::write(&import.asset, &pictures, &new, extras).map_err(bad)?;
     say.warnings(input, &warnings);
     Ok(out)
-}
-
-/// glTF knows no Catmull-Rom.
-fn with_slopes(clip: &Clip) -> Clip {
-    let track = |t: &Track| Track { target: t.target.clone(), curve: t.curve.with_slopes() };
-    Clip { name: clip.name.clone(), tracks: clip.tracks.iter().map(track).collect() }
 }
 
 fn png(texture: &Texture) -> Result<Vec<u8>, Failure> {

@@ -125,8 +125,8 @@ fn rewritten(
         })
         .collect();
     let name = input.display().to_string();
-    let write = if args.forms.limits() { gltf::with_clips_and_influences } else { gltf::with_clips };
-    write(&bytes, Some(folder(input)), &name, import, &clips, extras).map_err(|e| bad(&e))
+    let change = gltf::Change { clips: &clips, extras, influences: args.forms.limits() };
+    gltf::changed(&bytes, Some(folder(input)), &name, import, change).map_err(|e| bad(&e))
 }
 
 /// What the clips' edits leave to be said.

@@ -1,15 +1,16 @@
 //! What a file says beside its clips: notes in an animation's extras, and a node that moves alone.
 
-use super::rewrite::{Keys, Rewritten, list};
+use super::keys::Keys;
+use super::rewrite::{Rewritten, list};
 use crate::clip::{Curve, Interpolation, Target, Track};
 use crate::skeleton::BoneId;
 use glam::Quat;
 use serde_json::{Value, json};
 
 impl Rewritten {
-    /// Put `value` into `extras.sinew` of an animation.
-    pub fn note(&mut self, animation: usize, key: &str, value: Value) {
-        let Some(animation) = list(&mut self.json, "animations").get_mut(animation) else { return };
+    /// Put `value` into `extras.sinew` of what became of a clip.
+    pub fn note(&mut self, clip: usize, key: &str, value: Value) {
+        let Some(animation) = self.animation(clip) else { return };
         if !animation["extras"].is_object() {
             let before = animation["extras"].take();
             animation["extras"] = if before.is_null() { json!({}) } else { json!({"before": before}) };
@@ -20,14 +21,14 @@ impl Rewritten {
         animation["extras"]["sinew"][key] = value;
     }
 
-    /// Let an empty node of this name move with an animation: `T(translation) · R_y(yaw)`, straight between keys. Animations share
+    /// Let an empty node of this name move with a clip: `T(translation) · R_y(yaw)`, straight between keys. Animations share
     /// the node; whoever hangs something below it takes it along.
     ///
     /// # Panics
     /// If the three lists differ in length, or a number is not finite.
     pub fn add_moving_node(
         &mut self,
-        animation: usize,
+        clip: usize,
         name: &str,
         times: &[f64],
         translations: &[[f64; 3]],
@@ -44,8 +45,8 @@ impl Rewritten {
         for (path, target, values, width) in tracks {
             let curve = Curve::new(times.to_vec(), values, width, Interpolation::Linear);
             let track = Track { target, curve: curve.expect("finite keys in order") };
-            let sampler = keys.sampler(&track, false, first).expect("straight pieces have a place in glTF");
-            let Some(animation) = list(&mut self.json, "animations").get_mut(animation) else { return };
+            let sampler = keys.sampler(&track, false, first);
+            let Some(animation) = self.animation(clip) else { return };
             let samplers = animation["samplers"].as_array_mut().expect("written before");
             samplers.push(sampler);
             let channel = json!({"sampler": samplers.len() - 1, "target": {"node": node, "path": path}});

@@ -1,7 +1,8 @@
 //! Buffer views packed by EXT_meshopt_compression, written: each accessor in a view of its own, packed where that is smaller.
 
 use super::error::{GltfError, Result};
-use super::rewrite::{Rewritten, fallback_buffer, packing, primitives, renumber, source, view_places};
+use super::prune::{fallback_buffer, packing, primitives, renumber, source, view_places};
+use super::rewrite::Rewritten;
 use meshoptimizer_rs::codec;
 use meshoptimizer_rs::{Limits, Workspace};
 use serde_json::{Value, json};

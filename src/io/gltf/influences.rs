@@ -1,7 +1,8 @@
 //! Other influences for the vertices of a file.
 
 use super::error::{Result, value};
-use super::rewrite::{Rewritten, primitives};
+use super::prune::primitives;
+use super::rewrite::Rewritten;
 use super::write::influences;
 use crate::character::Binding;
 use crate::io::Import;

@@ -18,11 +18,13 @@ mod error;
 mod extensions;
 mod geometry;
 mod influences;
+mod keys;
 mod material;
 mod mend;
 mod mounts;
 mod nodes;
 mod pictures;
+mod prune;
 mod rewrite;
 mod skins;
 mod surface;
@@ -34,7 +36,7 @@ mod wear;
 mod write;
 
 pub use error::GltfError;
-pub use rewrite::{NewClip, Rewritten, with_clips, with_clips_and_influences};
+pub use rewrite::{Change, NewClip, Rewritten, changed};
 pub use wear::wear;
 pub use write::write;
 

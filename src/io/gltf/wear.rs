@@ -51,7 +51,7 @@ pub fn wear(out: &mut Rewritten, bytes: &[u8], base_dir: Option<&Path>, name: &s
     }
     // What had no material has none again.
     let count = list(&out.json, "materials").len() as u64;
-    for p in super::rewrite::primitives(&mut out.json) {
+    for p in super::prune::primitives(&mut out.json) {
         if p["material"].as_u64().is_some_and(|m| m >= count) {
             p.as_object_mut().map(|p| p.remove("material"));
         }

@@ -7,7 +7,8 @@ mod look;
 mod mesh;
 
 use super::error::{Result, value};
-use super::rewrite::{NewClip, Places, Rewritten};
+use super::keys::Places;
+use super::rewrite::{NewClip, Rewritten};
 use crate::asset::Asset;
 use crate::character::{Binding, Character, Instance};
 use crate::clip::{Clip, Target};
@@ -45,7 +46,7 @@ pub fn write(
     if !extras.is_empty() {
         about["extras"] = extras.into();
     }
-    let mut out = Rewritten { json: Map::from_iter([("asset".to_owned(), about)]), bin: vec![] };
+    let mut out = Rewritten { json: Map::from_iter([("asset".to_owned(), about)]), ..Rewritten::default() };
     let mut warnings = vec![];
     look::write(&mut out, asset, pictures, &mut warnings);
     let nodes = nodes(&mut out, asset, &mut warnings)?;

@@ -1,0 +1,130 @@
+//! Keys of clips as glTF stores them: nodes, samplers, accessors.
+
+use super::error::{Result, value};
+use crate::clip::{Interpolation, Target, Track};
+use crate::io::Import;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+
+/// The nodes that tracks move.
+pub(super) struct Places {
+    /// Of each bone; `u32::MAX` for one that is no node.
+    pub bones: Vec<u32>,
+    /// First morph weight of a run, and a node that it morphs.
+    pub weights: Vec<(usize, u32)>,
+}
+
+impl Places {
+    pub fn of(import: &Import) -> Self {
+        let character = &import.asset.character;
+        let instances = character.instances().iter().zip(&import.primitives);
+        let morphed = instances.filter(|(i, _)| !character.mesh(i).targets.is_empty());
+        let mut weights: Vec<(usize, u32)> = morphed.map(|(i, p)| (i.first_weight, p.node)).collect();
+        weights.dedup();
+        Self { bones: import.nodes.clone(), weights }
+    }
+
+    /// Nodes and the property that a track moves.
+    pub fn targets(&self, target: &Target) -> Result<Vec<(u32, &'static str)>> {
+        let (bone, path) = match target {
+            Target::Translation(b) => (b, "translation"),
+            Target::Rotation(b) => (b, "rotation"),
+            Target::Scale(b) => (b, "scale"),
+            Target::Xzx(b) => {
+                let found = format!("angles of bone {}", b.0);
+                return Err(value("a clip", "rotations", found));
+            }
+            Target::Weights { first } => {
+                let of = self.weights.iter().filter(|w| w.0 == *first);
+                return Ok(of.map(|w| (w.1, "weights")).collect());
+            }
+        };
+        let node = self.bones.get(bone.index()).copied().filter(|&n| n != u32::MAX);
+        let missing = || value("a clip", "bones that are nodes of the file", format!("bone {}", bone.0));
+        Ok(vec![(node.ok_or_else(missing)?, path)])
+    }
+}
+
+/// Keys of all clips: accessors, and the bytes of those with four-byte and with two-byte numbers.
+#[derive(Default)]
+pub(super) struct Keys {
+    pub parts: [Vec<u8>; 2],
+    /// Each with its part.
+    pub accessors: Vec<(Value, usize)>,
+    known: BTreeMap<(Vec<u8>, &'static str), usize>,
+}
+
+impl Keys {
+    /// A sampler of a track, whose accessors will follow `first` others. Slopes by a rule are written as numbers.
+    pub fn sampler(&mut self, track: &Track, short: bool, first: usize) -> Value {
+        let curve = &track.curve.with_slopes();
+        let mode = match curve.interpolation() {
+            Interpolation::Hold => "STEP",
+            Interpolation::Linear => "LINEAR",
+            Interpolation::Hermite | Interpolation::CatmullRom(_) => "CUBICSPLINE",
+        };
+        let kind = match track.target {
+            Target::Weights { .. } => "SCALAR",
+            Target::Rotation(_) => "VEC4",
+            _ => "VEC3",
+        };
+        let times = increasing(curve.times());
+        let input = self.floats(&times, "SCALAR", 1);
+        let each = if kind == "SCALAR" { 1 } else { curve.width() };
+        let output = match short {
+            true => self.shorts(curve.values()),
+            false => self.floats(curve.values(), kind, each),
+        };
+        let mut sampler = json!({"input": first + input, "output": first + output, "interpolation": mode});
+        if mode == "LINEAR" {
+            sampler.as_object_mut().expect("an object").remove("interpolation");
+        }
+        sampler
+    }
+
+    /// Equal lists are stored once.
+    fn floats(&mut self, values: &[f32], kind: &'static str, width: usize) -> usize {
+        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let mut accessor = json!({"componentType": 5126, "count": values.len() / width, "type": kind});
+        if kind == "SCALAR" {
+            let (lo, hi) =
+                values.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+            // A key's time has bounds by the specification; weights may.
+            (accessor["min"], accessor["max"]) = (json!([lo]), json!([hi]));
+        }
+        self.put(bytes, kind, accessor, 0)
+    }
+
+    fn shorts(&mut self, values: &[f32]) -> usize {
+        let bytes: Vec<u8> =
+            values.iter().flat_map(|v| ((v * 32767.0).round() as i16).to_le_bytes()).collect();
+        let accessor =
+            json!({"componentType": 5122, "normalized": true, "count": values.len() / 4, "type": "VEC4"});
+        self.put(bytes, "short", accessor, 1)
+    }
+
+    fn put(&mut self, bytes: Vec<u8>, kind: &'static str, mut accessor: Value, part: usize) -> usize {
+        let next = self.accessors.len();
+        let key = (bytes, kind);
+        if let Some(&known) = self.known.get(&key) {
+            return known;
+        }
+        if !self.parts[part].is_empty() {
+            accessor["byteOffset"] = self.parts[part].len().into();
+        }
+        self.parts[part].extend(&key.0);
+        self.known.insert(key, next);
+        self.accessors.push((accessor, part));
+        next
+    }
+}
+
+/// Times in single precision, each after the one before: of two keys at one time the second moves on by the least step.
+fn increasing(times: &[f64]) -> Vec<f32> {
+    let mut out: Vec<f32> = Vec::with_capacity(times.len());
+    for &t in times {
+        let t = t as f32;
+        out.push(out.last().map_or(t, |&last| if t > last { t } else { last.next_up() }));
+    }
+    out
+}
