@@ -5,6 +5,7 @@
 //! stays within what was asked for. What is promised was measured on the vertices, at keys, at frames and between them.
 
 mod bound;
+mod cost;
 mod cubic;
 pub mod edit;
 mod fit;

@@ -1,14 +1,12 @@
 //! How the error is shared among the tracks.
 
+use super::cost::Costs;
 use super::fit::{self, Kind, Samples};
 use super::gauge::{Gauge, Looks};
 use super::{BakeDesc, Baked, Goal, Report, SEAM, cubic, edit, times};
 use crate::character::Character;
 use crate::clip::{Clip, Curve, Interpolation, Target, Track};
 use std::collections::BTreeSet;
-
-/// Moments at which levers are measured.
-pub(super) const LEVER_MOMENTS: usize = 24;
 
 /// Moments at which the search compares vertices.
 pub(super) const SEARCH_MOMENTS: usize = 400;
@@ -47,30 +45,16 @@ pub(super) struct Plan<'a> {
 impl<'a> Plan<'a> {
     /// `start` holds the keys to choose from; what they make is compared with `clip`.
     pub fn new(character: &Character, clip: &'a Clip, start: &Clip, gauge: &Gauge, desc: &BakeDesc) -> Self {
-        let levers = gauge.levers(clip, &times::coarse(clip, LEVER_MOMENTS));
-        let longest = levers.iter().map(|l| l.turn).fold(0.0, f64::max);
-        let rest = gauge.unmoved();
-        let targets = character.target_reach();
+        let costs = Costs::new(gauge, clip);
         let vertices = character.instances().iter().map(|i| character.mesh(i).positions.len()).sum();
         let mut jobs: Vec<Job> = vec![];
         for track in &start.tracks {
-            let at = |b: crate::skeleton::BoneId| levers[b.index()].turn.max(0.02 * longest).max(1e-9);
-            let (kind, lever, rest) = match track.target {
-                Target::Rotation(b) => {
-                    (Kind::Rotation, at(b), rest.locals[b.index()].rotation.to_array().to_vec())
-                }
-                Target::Translation(b) => (
-                    Kind::Vector,
-                    levers[b.index()].shift.max(1e-9),
-                    rest.locals[b.index()].translation.to_array().to_vec(),
-                ),
-                Target::Scale(b) => (Kind::Vector, at(b), rest.locals[b.index()].scale.to_array().to_vec()),
-                Target::Xzx(b) => (Kind::Angles, at(b), vec![0.0; 3]),
-                Target::Weights { first } => {
-                    let run = first..first + track.curve.width();
-                    let reach = targets[run.clone()].iter().sum::<f64>().max(1e-9);
-                    (Kind::Weights, reach, rest.weights[run].to_vec())
-                }
+            let (lever, rest) = costs.of(track);
+            let kind = match track.target {
+                Target::Rotation(_) => Kind::Rotation,
+                Target::Xzx(_) => Kind::Angles,
+                Target::Weights { .. } => Kind::Weights,
+                Target::Translation(_) | Target::Scale(_) => Kind::Vector,
             };
             let mut samples = Samples::of(&track.curve, kind);
             if desc.fps.is_some() && track.curve.interpolation() == Interpolation::Linear {

@@ -7,6 +7,7 @@
 
 mod path;
 
+use super::cost::Costs;
 use super::gauge::Gauge;
 use super::{BakeDesc, BakeError, Baked, SEAM, Watch, bake_from, check, edit, plan, start, times};
 use crate::character::Character;
@@ -92,13 +93,11 @@ pub fn convert(
     check(character, clip, desc)?;
     let gauge = Gauge::of(character, desc).watched(watch);
     let frames = start(clip, desc, desc.fps)?;
-    let levers = gauge.levers(clip, &times::coarse(clip, plan::LEVER_MOMENTS));
-    let longest = levers.iter().map(|l| l.turn).fold(0.0, f64::max);
-    let lever = |b: BoneId| levers[b.index()].turn.max(0.02 * longest).max(1e-9);
+    let costs = Costs::new(&gauge, clip);
     let mut part = FIRST_PART;
     let mut last = None;
     for _ in 0..12 {
-        let allowed = |b: BoneId| (part * desc.tolerance / lever(b)).max(FINEST);
+        let allowed = |b: BoneId| (part * desc.tolerance / costs.turn(b)).max(FINEST);
         let mut path = rewritten(character, &frames, form, desc.fps.is_none(), allowed);
         if desc.cycle {
             path = edit::close(&path, SEAM);

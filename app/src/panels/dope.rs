@@ -2,14 +2,14 @@
 //! and keys too close to tell apart as one block, so a frame costs what it shows.
 
 use super::axis::{self, Axis, RULER, SELECTED};
-use super::grip::{Drag, Grip};
+use super::grip::{self, Drag, Grip};
 use super::parts::{Names, menu};
 use super::summary::Summary;
 use crate::Bus;
 use crate::commands::Task;
 use crate::state::document::track_name;
 use crate::state::{Command, EditClip, Keys, Mode, Selection, Spans, State, TrackKeys};
-use egui::{Align2, Color32, FontId, PointerButton, Pos2, Rect, Sense, Stroke, Vec2, pos2};
+use egui::{Align2, Color32, FontId, PointerButton, Pos2, Rect, Sense, Vec2, pos2};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -262,16 +262,7 @@ impl Dope {
         let to = (axis.t(at.x), f64::from(at.y - body.top() + self.scroll));
         let corner = pos2(axis.x(from.0), body.top() + from.1 as f32 - self.scroll);
         let shown = Rect::from_two_pos(corner, at);
-        let painter = ui
-            .painter_at(axis.rect)
-            .with_layer_id(egui::LayerId::new(egui::Order::Foreground, ui.scope_id()));
-        painter.rect(
-            shown,
-            0.0,
-            SELECTED.gamma_multiply(0.1),
-            Stroke::new(1.0, SELECTED),
-            egui::StrokeKind::Inside,
-        );
+        grip::draw_box(ui, axis.rect, shown);
         if ui.input(|i| i.pointer.primary_released()) {
             let add = ui.input(|i| i.modifiers.shift);
             let keys =

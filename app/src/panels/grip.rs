@@ -1,6 +1,6 @@
 //! What a pointer does to keys, the same in the dope sheet and the graph.
 
-use super::axis::Axis;
+use super::axis::{Axis, SELECTED};
 use crate::Bus;
 use crate::commands::Task;
 use crate::state::{Command, Edit, Keys, Mode, State};
@@ -162,4 +162,12 @@ impl Grip {
 /// The pointer's second in a pane.
 pub fn second(axis: &Axis, at: Pos2) -> f64 {
     axis.t(at.x)
+}
+
+/// The box of a drag on empty ground, over the pane.
+pub fn draw_box(ui: &egui::Ui, pane: egui::Rect, shown: egui::Rect) {
+    let painter =
+        ui.painter_at(pane).with_layer_id(egui::LayerId::new(egui::Order::Foreground, ui.scope_id()));
+    let edge = egui::Stroke::new(1.0, SELECTED);
+    painter.rect(shown, 0.0, SELECTED.gamma_multiply(0.1), edge, egui::StrokeKind::Inside);
 }

@@ -267,24 +267,28 @@ impl<'a> Gauge<'a> {
 
     /// Work on every item, on all threads, results in order.
     pub(super) fn map<S: Sync + Copy, T: Send>(&self, items: &[S], work: impl Fn(S) -> T + Sync) -> Vec<T> {
-        let parts = self.chunks(items.len(), |_, range| range.map(|i| work(items[i])).collect::<Vec<_>>());
+        let parts = self.parts(items.len(), |_, range| range.map(|i| work(items[i])).collect::<Vec<_>>());
         parts.into_iter().flatten().collect()
     }
 
-    /// Work on all of `0..n` in parts, on all threads, results in order.
+    /// Pose `0..n` in parts, and tell whoever watches of each.
     fn chunks<T: Send>(&self, n: usize, work: impl Fn(&mut Bench, Range<usize>) -> T + Sync) -> Vec<T> {
-        let threads = self.threads.min(n).max(1);
-        let share = n.div_ceil(8 * threads).max(1);
-        let parts: Vec<Range<usize>> = (0..n).step_by(share).map(|i| i..(i + share).min(n)).collect();
-        let told = |bench: &mut Bench, part: Range<usize>| {
+        self.parts(n, |bench, part| {
             let count = part.len();
             let out = work(bench, part);
             self.watch.iter().for_each(|w| w(self.stage, count));
             out
-        };
+        })
+    }
+
+    /// Work on all of `0..n` in parts, on all threads, results in order.
+    fn parts<T: Send>(&self, n: usize, work: impl Fn(&mut Bench, Range<usize>) -> T + Sync) -> Vec<T> {
+        let threads = self.threads.min(n).max(1);
+        let share = n.div_ceil(8 * threads).max(1);
+        let parts: Vec<Range<usize>> = (0..n).step_by(share).map(|i| i..(i + share).min(n)).collect();
         if threads == 1 {
             let mut bench = Bench::default();
-            return parts.into_iter().map(|p| told(&mut bench, p)).collect();
+            return parts.into_iter().map(|p| work(&mut bench, p)).collect();
         }
         let next = AtomicUsize::new(0);
         let out: Vec<Mutex<Option<T>>> = parts.iter().map(|_| Mutex::new(None)).collect();
@@ -296,7 +300,7 @@ impl<'a> Gauge<'a> {
                         let i = next.fetch_add(1, Ordering::Relaxed);
                         let Some(part) = parts.get(i) else { break };
                         *out[i].lock().expect("each part is taken once") =
-                            Some(told(&mut bench, part.clone()));
+                            Some(work(&mut bench, part.clone()));
                     }
                 });
             }

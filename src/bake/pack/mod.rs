@@ -2,12 +2,12 @@
 
 mod job;
 mod spline;
-
+use super::cost::Costs;
 use super::gauge::Gauge;
 use super::{BakeDesc, BakeError, Report, plan, times};
 use crate::character::Character;
 use crate::clip::packed::{self, Draft, DraftForm, Grid};
-use crate::clip::{Clip, Packed, Target};
+use crate::clip::{Clip, Packed};
 use job::Job;
 
 /// A packed clip and what was reached with it.
@@ -52,9 +52,6 @@ pub fn pack(character: &Character, clip: &Clip, desc: &BakeDesc) -> Result<Packe
     Err(BakeError::Missed { clip, tolerance: worst.limit, reached: found * worst.limit, time: worst.time })
 }
 
-/// Moments at which levers are measured.
-const LEVER_MOMENTS: usize = 24;
-
 /// Moments at which the search compares vertices.
 const SEARCH_MOMENTS: usize = 300;
 
@@ -75,27 +72,11 @@ struct Search<'a> {
 
 impl<'a> Search<'a> {
     fn new(character: &Character, clip: &'a Clip, gauge: &'a Gauge, desc: &BakeDesc) -> Self {
-        let levers = gauge.levers(clip, &times::coarse(clip, LEVER_MOMENTS));
-        let longest = levers.iter().map(|l| l.turn).fold(0.0, f64::max);
-        let rest = character.rest_pose();
-        let reach = character.target_reach();
+        let costs = Costs::new(gauge, clip);
         let range = clip.range();
         let mut jobs: Vec<Job> = vec![];
         for track in &clip.tracks {
-            let turn = |b: crate::skeleton::BoneId| levers[b.index()].turn.max(0.02 * longest).max(1e-9);
-            let (lever, rest) = match track.target {
-                Target::Rotation(b) => (turn(b), rest.locals[b.index()].rotation.to_array().to_vec()),
-                Target::Translation(b) => (
-                    levers[b.index()].shift.max(1e-9),
-                    rest.locals[b.index()].translation.to_array().to_vec(),
-                ),
-                Target::Scale(b) => (turn(b), rest.locals[b.index()].scale.to_array().to_vec()),
-                Target::Xzx(b) => (turn(b), vec![0.0; 3]),
-                Target::Weights { first } => {
-                    let run = first..first + track.curve.width();
-                    (reach[run.clone()].iter().sum::<f64>().max(1e-9), rest.weights[run].to_vec())
-                }
-            };
+            let (lever, rest) = costs.of(track);
             // The last track of a channel is the one that shows.
             jobs.retain(|j| j.target != track.target);
             jobs.push(Job::new(track, range, rest, lever));

@@ -6,14 +6,14 @@ mod draw;
 pub use draw::singular;
 
 use super::axis::{self, Axis, RULER, SELECTED};
-use super::grip::{Drag, Grip};
+use super::grip::{self, Drag, Grip};
 use super::parts::{Names, menu};
 use crate::Bus;
 use crate::commands::Task;
 use crate::state::{Command, Keys, Mode, Spans, State, TrackKeys};
 use channel::{Channel, Values, channels, extent, nearest};
 use draw::{curve, legend, levels, tangent};
-use egui::{Align2, Color32, FontId, PointerButton, Pos2, Rect, Sense, Stroke, Vec2, pos2};
+use egui::{Align2, Color32, FontId, PointerButton, Pos2, Rect, Sense, Vec2, pos2};
 
 /// Width of the values.
 const LABELS: f32 = 66.0;
@@ -177,16 +177,7 @@ impl Graph {
             return;
         }
         let shown = Rect::from_two_pos(pos2(axis.x(from.0), values.y(from.1)), at);
-        let painter = ui
-            .painter_at(axis.rect)
-            .with_layer_id(egui::LayerId::new(egui::Order::Foreground, ui.scope_id()));
-        painter.rect(
-            shown,
-            0.0,
-            SELECTED.gamma_multiply(0.1),
-            Stroke::new(1.0, SELECTED),
-            egui::StrokeKind::Inside,
-        );
+        grip::draw_box(ui, axis.rect, shown);
         if !ui.input(|i| i.pointer.primary_released()) {
             return;
         }
