@@ -13,6 +13,12 @@ const BRACKET: f64 = 1.02;
 /// Rounds of halving that only bring the bound closer, and gaps in each.
 const CLOSER: [usize; 2] = [12, 64];
 
+/// Every so many moments are looked at first, for what the worst will be near.
+const FIRST: usize = 16;
+
+/// Shares below this part of the worst are not told apart.
+const SHOWN: f64 = 0.6;
+
 /// Moments over the limit that are told of.
 const OVER: usize = 64;
 
@@ -81,15 +87,21 @@ pub(super) fn verify(gauge: &Gauge, a: &Clip, b: &Clip) -> Verdict {
 }
 
 impl Verdict {
-    /// The shares at these moments.
+    /// What the shares at these moments do not exceed.
     fn look(&mut self, gauge: &Gauge, clips: [&Clip; 2], times: &[f64]) -> Vec<f64> {
-        let found = gauge.profile(clips[0], clips[1], times);
+        if self.moments == 0 {
+            let first: Vec<f64> = times.iter().copied().step_by(FIRST).collect();
+            self.worst = gauge.worst(clips[0], clips[1], &first);
+        }
+        // Shares far below the worst need not be known exactly.
+        let floor = SHOWN * self.worst.share();
+        let found = gauge.profile(clips[0], clips[1], times, floor);
         self.moments += times.len();
         self.worst = found.iter().copied().fold(self.worst, Worst::worse);
         let mut over: Vec<&Worst> = found.iter().filter(|w| w.share() > 1.0).collect();
         over.sort_by(|a, b| b.share().total_cmp(&a.share()).then(a.time.total_cmp(&b.time)));
         self.over.extend(over.iter().take(OVER).map(|w| w.time));
-        found.iter().map(Worst::share).collect()
+        found.iter().map(|w| w.share().max(floor)).collect()
     }
 
     /// A bound for all of the time between the first and the last knot.
