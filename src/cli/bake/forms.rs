@@ -3,11 +3,11 @@
 use super::clips::Edited;
 use super::report::{self, Done};
 use super::write::{self, put_bytes};
-use super::{Args, failure};
+use super::{Args, failure, mesh, threads};
 use crate::cli::{Failure, say::Say};
 use serde_json::{Map, Value, json};
 use sinew::asset::Asset;
-use sinew::bake::{self, BakeDesc, Baked, influences};
+use sinew::bake::{self, BakeDesc, Baked, vertices};
 use sinew::clip::Clip;
 use sinew::io::still::{self, Stance, Still};
 use sinew::io::{self, Import, gltf, obj, pc2, ply, sinew_clip, stl};
@@ -39,12 +39,18 @@ pub(super) struct Forms {
     /// Pack all keys, vertices and indices by EXT_meshopt_compression, without loss.
     #[arg(long, conflicts_with_all = ["pose_at", "vertices"])]
     pub meshopt: bool,
+    /// Store vertices in integers (KHR_mesh_quantization), as coarse as a third of the tolerance allows; the clips have what that leaves.
+    #[arg(long, conflicts_with_all = ["pose_at", "vertices"])]
+    pub quantize_mesh: bool,
 }
 
 fn rate(text: &str) -> Result<f64, String> {
     let fps = text.parse::<f64>().ok().filter(|f| (0.1..=1000.0).contains(f));
     fps.ok_or_else(|| "expected frames a second, 0.1 to 1000".into())
 }
+
+/// No tolerance: what is asked for is told, whatever it costs.
+const UNBOUND: f64 = 1e12;
 
 /// What the name of the output asks for.
 fn ending(output: &Path) -> String {
@@ -135,14 +141,13 @@ impl Forms {
         };
         let time = |k: f64| range.start + k / self.vertices_fps;
         let stance = Stance::new(c, &groups(import));
-        let off = (0..intervals).map(|k| {
-            let at = |u: f64| stance.points(&pose(time(k as f64 + u)));
-            let [a, b, m] = [at(0.0), at(1.0), at(0.5)];
-            m.iter().zip(a.iter().zip(&b)).map(|(m, (a, b))| m.distance(0.5 * (*a + *b))).fold(0.0, f64::max)
+        let frames: Vec<f64> = (0..=intervals).map(|k| time(k as f64)).collect();
+        let desc = BakeDesc { tolerance: UNBOUND, threads: threads(args), ..BakeDesc::default() };
+        let cost = vertices::straight(c, clip, &frames, &desc);
+        let told = json!({
+            "fps": self.vertices_fps, "frames": intervals + 1, "between_frames": cost.ceiling,
+            "measured": cost.worst.distance, "time": cost.worst.time, "moments": cost.moments,
         });
-        let off = off.fold(0.0, f64::max);
-        // A parabola through the middle is farthest off there.
-        let told = json!({"fps": self.vertices_fps, "frames": intervals + 1, "between_frames": off});
         if cache {
             let still = stance.at(&pose(time(0.0)));
             let mut bytes = pc2::head(still.points.len() as u32, intervals as u32 + 1);
@@ -158,33 +163,39 @@ impl Forms {
             frozen(args, [input, output], import, &poses, self.vertices_fps, &clip.name, &told)?;
         }
         say.note(&format!(
-            "{} frames; exact at each, and up to {:.4} mm off in the middle between two",
+            "{} frames; exact at each, and at most {:.4} mm off between two, at {:.3} s",
             intervals + 1,
-            1e3 * off
+            1e3 * cost.ceiling,
+            cost.worst.time
         ));
         Ok(told)
     }
 
     /// The import with fewer influences, and what that costs.
-    pub fn limited(&self, import: &Import, clips: &[&Clip], say: &Say) -> Option<(Import, Value)> {
+    pub fn limited(&self, import: &Import, edited: &[Edited], say: &Say) -> Option<(Import, Value)> {
         let k = self.influences?;
         let c = &import.asset.character;
         let less = c.with_influences(k.into());
-        let cost = influences::cost(c, &less, clips);
+        let (vertices, dropped) = vertices::dropped(c, &less);
+        let (cost, _) =
+            mesh::worst(c, &less, edited, &BakeDesc { tolerance: UNBOUND, ..BakeDesc::default() });
         say.note(&format!(
-            "at most {k} influences: {} vertices lose up to {:.1}% of their weight and stray by up to {:.4} mm (by their weights, no more than {:.4} mm)",
-            cost.vertices,
-            100.0 * cost.dropped,
-            1e3 * cost.worst.distance,
-            1e3 * cost.bound
+            "at most {k} influences: {vertices} vertices lose up to {:.1}% of their weight and stray by at most {:.4} mm",
+            100.0 * dropped,
+            1e3 * cost.ceiling,
         ));
         let told = json!({
-            "kept": k, "vertices": cost.vertices, "dropped": cost.dropped, "bound": cost.bound,
+            "kept": k, "vertices": vertices, "dropped": dropped, "bound": cost.ceiling,
             "measured": cost.worst.distance, "time": cost.worst.time, "moments": cost.moments,
         });
         let mut limited = import.clone();
         limited.asset.character = less;
         Some((limited, told))
+    }
+
+    /// Whether there is something to do without any clip.
+    pub fn any(&self) -> bool {
+        self.limits() || self.meshopt || self.quantize_mesh
     }
 
     /// Whether the file's own influences no longer serve.
@@ -245,7 +256,7 @@ fn packed(
     let (mut packed, mut done) = (vec![], vec![]);
     for e in edited {
         let one = bake::pack(c, &e.clip, desc).map_err(failure)?;
-        done.push(Done { edited: e, baked: Baked { report: one.report, ..Baked::default() } });
+        done.push(Done { edited: e, baked: Baked { report: one.report, ..Baked::default() }, mesh: 0.0 });
         packed.push((e.clip.name.as_str(), one.packed));
     }
     let all: Vec<_> = packed.iter().map(|(name, p)| (*name, p)).collect();

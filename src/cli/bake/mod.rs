@@ -3,6 +3,7 @@
 mod clips;
 mod forms;
 mod fresh;
+mod mesh;
 mod motion;
 mod report;
 mod to;
@@ -74,7 +75,7 @@ pub struct Args {
     /// otherwise.
     #[arg(long, value_name = "bytes|keys", value_parser = fewest)]
     fewest: Option<Goal>,
-    /// Keep rotations as 32-bit floating point.
+    /// Keep rotations and morph weights as 32-bit floating point.
     #[arg(long)]
     no_quantize: bool,
     /// Worker threads; one a core by default. The result does not depend on them.
@@ -174,17 +175,21 @@ fn chosen(args: &Args, input: &Path, import: &Import) -> Result<Vec<usize>, Fail
         Some(one) if args.clip.is_some() => vec![one],
         _ => (0..clips.len()).collect(),
     };
-    if chosen.is_empty() && import.format == "glTF" && !to::is_rig(Path::new(&args.output)) {
+    let nothing = chosen.is_empty() && !args.forms.any();
+    if nothing && import.format == "glTF" && !to::is_rig(Path::new(&args.output)) {
         return Err(Failure::Input(format!("{}: there are no clips to bake", input.display())));
     }
     Ok(chosen)
 }
 
+fn threads(args: &Args) -> usize {
+    args.threads.map_or_else(|| std::thread::available_parallelism().map_or(1, Into::into), Into::into)
+}
+
 /// What is promised of a file's clips.
 fn desc(args: &Args, import: &Import) -> Result<(BakeDesc, f64), Failure> {
     let character = &import.asset.character;
-    let threads =
-        args.threads.map_or_else(|| std::thread::available_parallelism().map_or(1, Into::into), Into::into);
+    let threads = threads(args);
     let diagonal = Gauge::new(character, threads).diagonal();
     let pins = args.pin.iter().map(|(name, limit)| {
         let missing =
@@ -236,8 +241,7 @@ fn one(
         f.with_message(message)
     };
     let edited = clips::edited(&args.edits, import, &chosen, &desc, say).map_err(placed)?;
-    let clips: Vec<_> = edited.iter().map(|e| &e.clip).collect();
-    let limited = args.forms.limited(import, &clips, say);
+    let limited = args.forms.limited(import, &edited, say);
     let import = limited.as_ref().map_or(import, |l| &l.0);
     if let Some(report) =
         args.forms.write(args, [input, output], import, &edited, &desc, say).map_err(placed)?
@@ -246,11 +250,17 @@ fn one(
         told.push(report);
         return Ok(());
     }
+    let quantized =
+        args.forms.quantize_mesh.then(|| mesh::quantized(args, input, import, &edited, &desc, say));
+    let quantized = quantized.transpose()?;
+    let character = quantized.as_ref().map_or(&import.asset.character, |q| &q.character);
+    let mesh = quantized.as_ref().map_or(0.0, |q| q.error);
+    let left = desc.tolerance - if desc.metric == Metric::Vertices { mesh } else { 0.0 };
     let bar = say.clip_progress(edited.len());
     let mut done = vec![];
     for e in &edited {
         tell_coarse_times(&e.clip, say);
-        let desc = BakeDesc { cycle: e.cycle, over: e.over.clone(), ..desc.clone() };
+        let desc = BakeDesc { tolerance: left, cycle: e.cycle, over: e.over.clone(), ..desc.clone() };
         let poses = AtomicUsize::new(0);
         let watch = |stage: Stage, n: usize| {
             let all = poses.fetch_add(n, Ordering::Relaxed) + n;
@@ -258,8 +268,8 @@ fn one(
             let clip = say::name(&e.clip.name);
             bar.set_message(format!("{}, {clip}: {doing}, {all} poses compared", input.display()));
         };
-        let baked = to::bake(form, &import.asset.character, &e.clip, &desc, &watch);
-        done.push(Done { edited: e, baked: baked.map_err(failure).map_err(placed)? });
+        let baked = to::bake(form, character, &e.clip, &desc, &watch);
+        done.push(Done { edited: e, baked: baked.map_err(failure).map_err(placed)?, mesh });
         bar.inc(1);
     }
     bar.finish_and_clear();
@@ -270,7 +280,10 @@ fn one(
     if let Some((_, cost)) = &limited {
         report["influences"] = cost.clone();
     }
-    write::write(args, input, output, import, &done, &report, say)?;
+    if let Some(q) = &quantized {
+        report["mesh"] = q.told.clone();
+    }
+    write::write(args, input, output, import, &done, quantized.as_ref().map(|q| &q.forms), &report, say)?;
     outcome.done += 1;
     for d in done.iter().filter(|_| !args.json) {
         say.note(&report::line(import, d, diagonal));

@@ -11,6 +11,18 @@ use sinew::io::Import;
 pub(super) struct Done<'a> {
     pub edited: &'a Edited,
     pub baked: Baked,
+    /// Metres that its vertices are off already, because they are stored in integers.
+    pub mesh: f64,
+}
+
+impl Done<'_> {
+    /// Metres that nothing exceeds, and those that are allowed.
+    fn error(&self) -> [f64; 2] {
+        let r = &self.baked.report;
+        // Points on bones are where they were.
+        let mesh = if matches!(r.worst.spot, Some(Spot::Bone(_))) { 0.0 } else { self.mesh };
+        [r.ceiling * r.worst.limit + mesh, r.worst.limit + mesh]
+    }
 }
 
 pub(super) fn bone_of(import: &Import, b: &Baked) -> String {
@@ -33,13 +45,14 @@ pub(super) fn line(import: &Import, done: &Done, diagonal: f64) -> String {
         r.bytes[0],
         r.bytes[1]
     );
-    if r.worst.spot.is_none() && r.ceiling == 0.0 {
+    let [error, _] = done.error();
+    if r.worst.spot.is_none() && error == 0.0 {
         return format!("{made}; nothing is off");
     }
     format!(
         "{made}; at most {:.4} mm off ({:.4}% of the diagonal), at {:.3} s on {}",
-        1e3 * r.ceiling * r.worst.limit,
-        100.0 * r.ceiling * r.worst.limit / diagonal.max(1e-30),
+        1e3 * error,
+        100.0 * error / diagonal.max(1e-30),
         r.worst.time,
         say::name(&bone_of(import, &done.baked)),
     )
@@ -60,11 +73,12 @@ pub(super) fn report(import: &Import, done: &[Done], args: &Args, desc: &BakeDes
     };
     let clips = done.iter().map(|d| {
         let (b, r) = (&d.baked, &d.baked.report);
+        let [error, limit] = d.error();
         let mut told = json!({
             "clip": d.edited.clip.name,
-            "error": r.ceiling * r.worst.limit,
+            "error": error,
             "measured": r.worst.distance,
-            "limit": r.worst.limit,
+            "limit": limit,
             "worst": worst(import, b),
             "moments": r.moments,
             "keys": r.keys,

@@ -5,8 +5,10 @@ use super::{Args, fresh, to};
 use crate::cli::batch::{self, Names};
 use crate::cli::{Failure, say, say::Say};
 use serde_json::{Map, Value, json};
+use sinew::io::gltf::MeshForm;
 use sinew::io::picture::{AtomicFile, Folder};
 use sinew::io::{self, Import, gltf};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Say so before the work and not after it.
@@ -58,6 +60,7 @@ pub(super) fn write(
     output: &Path,
     import: &Import,
     done: &[Done],
+    forms: Option<&BTreeMap<usize, MeshForm>>,
     report: &Value,
     say: &Say,
 ) -> Result<(), Failure> {
@@ -79,6 +82,9 @@ pub(super) fn write(
     let bad = |e| Failure::Input(format!("{}: {e}", input.display()));
     if folder.canonicalize().ok() != there.canonicalize().ok() {
         out.embed_pictures(Some(folder)).map_err(bad)?;
+    }
+    if let Some(forms) = forms {
+        out.quantize(forms).map_err(bad)?;
     }
     // What came packed does not grow.
     if args.forms.meshopt || import.extensions.iter().any(|e| e == "EXT_meshopt_compression") {
@@ -107,7 +113,7 @@ fn folder(input: &Path) -> &Path {
 }
 
 /// The input with other clips.
-fn rewritten(
+pub(super) fn rewritten(
     args: &Args,
     input: &Path,
     import: &Import,

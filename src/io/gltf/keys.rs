@@ -1,7 +1,7 @@
 //! Keys of clips as glTF stores them: nodes, samplers, accessors.
 
 use super::error::{Result, value};
-use crate::clip::{Interpolation, Target, Track};
+use crate::clip::{Integers, Interpolation, Target, Track};
 use crate::io::Import;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -45,10 +45,10 @@ impl Places {
     }
 }
 
-/// Keys of all clips: accessors, and the bytes of those with four-byte and with two-byte numbers.
+/// Keys of all clips: accessors, and the bytes of those with four-byte, with two-byte and with one-byte numbers.
 #[derive(Default)]
 pub(super) struct Keys {
-    pub parts: [Vec<u8>; 2],
+    pub parts: [Vec<u8>; 3],
     /// Each with its part.
     pub accessors: Vec<(Value, usize)>,
     known: BTreeMap<(Vec<u8>, &'static str), usize>,
@@ -71,9 +71,13 @@ impl Keys {
         let times = increasing(curve.times());
         let input = self.floats(&times, "SCALAR", 1);
         let each = if kind == "SCALAR" { 1 } else { curve.width() };
-        let output = match short {
-            true => self.shorts(curve.values()),
-            false => self.floats(curve.values(), kind, each),
+        let form = match kind {
+            "SCALAR" => curve.integers(),
+            _ => Some(Integers { bits: 16, signed: true }),
+        };
+        let output = match form.filter(|_| short) {
+            Some(form) => self.integers(curve.values(), kind, each, form),
+            None => self.floats(curve.values(), kind, each),
         };
         let mut sampler = json!({"input": first + input, "output": first + output, "interpolation": mode});
         if mode == "LINEAR" {
@@ -95,12 +99,16 @@ impl Keys {
         self.put(bytes, kind, accessor, 0)
     }
 
-    fn shorts(&mut self, values: &[f32]) -> usize {
-        let bytes: Vec<u8> =
-            values.iter().flat_map(|v| ((v * 32767.0).round() as i16).to_le_bytes()).collect();
-        let accessor =
-            json!({"componentType": 5122, "normalized": true, "count": values.len() / 4, "type": "VEC4"});
-        self.put(bytes, "short", accessor, 1)
+    fn integers(&mut self, values: &[f32], kind: &'static str, width: usize, form: Integers) -> usize {
+        let size = form.bits / 8;
+        let number = |v: &f32| ((v * form.unit()).round() as i32).to_le_bytes().into_iter().take(size);
+        let bytes: Vec<u8> = values.iter().flat_map(number).collect();
+        let code = 5118 + 2 * size + usize::from(!form.signed);
+        let count = values.len() / width;
+        let accessor = json!({"componentType": code, "normalized": true, "count": count, "type": kind});
+        let known =
+            [["byte", "unsigned byte"], ["short", "unsigned short"]][size - 1][usize::from(!form.signed)];
+        self.put(bytes, known, accessor, 3 - size)
     }
 
     fn put(&mut self, bytes: Vec<u8>, kind: &'static str, mut accessor: Value, part: usize) -> usize {

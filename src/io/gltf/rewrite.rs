@@ -72,8 +72,10 @@ pub fn changed(
     if influenced {
         unused.extend(influences::strip(&mut json));
     }
-    prune::drop_accessors(&mut json, &unused);
-    let mut out = Rewritten { bin: prune::repack(&mut json, &doc), json, ..Rewritten::default() };
+    let torn = prune::drop_accessors(&mut json, &unused);
+    let bin = prune::repack(&mut json, |buffer| doc.raw(buffer));
+    let mut out = Rewritten { bin, json, ..Rewritten::default() };
+    out.split(&torn, false)?;
     if influenced {
         influences::write(&mut out, import)?;
     }
@@ -181,7 +183,17 @@ impl Rewritten {
         self.with_buffer(Some(uri))
     }
 
-    fn with_buffer(&self, uri: Option<&str>) -> Vec<u8> {
+    /// Say that nobody reads this file without an extension.
+    pub(super) fn requires(&mut self, extension: &str) {
+        for key in ["extensionsUsed", "extensionsRequired"] {
+            let names = list(&mut self.json, key);
+            if !names.iter().any(|e| e == extension) {
+                names.push(extension.into());
+            }
+        }
+    }
+
+    pub(super) fn with_buffer(&self, uri: Option<&str>) -> Vec<u8> {
         let mut json = self.json.clone();
         if let Some(Value::Array(buffers)) = json.get_mut("buffers") {
             buffers[0]["byteLength"] = self.bin.len().into();
@@ -244,9 +256,9 @@ impl Rewritten {
     /// Put the keys behind what is there.
     pub(super) fn append(&mut self, keys: Keys) {
         let views = list(&mut self.json, "bufferViews").len();
-        // Four-byte numbers first, so that both parts are aligned.
+        // Wider numbers first, so that all parts are aligned.
         self.bin.resize(self.bin.len().next_multiple_of(4), 0);
-        let mut view_of = [0; 2];
+        let mut view_of = [0; 3];
         let mut next = views;
         for (i, part) in keys.parts.iter().enumerate() {
             if !part.is_empty() {
