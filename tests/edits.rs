@@ -18,14 +18,14 @@ use sinew::skin::Weights;
 
 /// A glTF file in the making.
 #[derive(Default)]
-struct File {
-    bin: Vec<u8>,
-    accessors: Vec<Value>,
-    views: Vec<Value>,
+pub struct File {
+    pub bin: Vec<u8>,
+    pub accessors: Vec<Value>,
+    pub views: Vec<Value>,
 }
 
 impl File {
-    fn floats(&mut self, values: &[f32], kind: &str) -> usize {
+    pub fn floats(&mut self, values: &[f32], kind: &str) -> usize {
         let each = [("SCALAR", 1), ("VEC3", 3), ("VEC4", 4)].iter().find(|k| k.0 == kind).unwrap().1;
         let (lo, hi) = values.iter().fold((f32::MAX, f32::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
         let view = json!({"buffer": 0, "byteOffset": self.bin.len(), "byteLength": 4 * values.len()});
@@ -45,7 +45,7 @@ impl File {
         self.accessors.len() - 1
     }
 
-    fn done(self, mut json: Value) -> Vec<u8> {
+    pub fn done(self, mut json: Value) -> Vec<u8> {
         let mut map = json.as_object_mut().unwrap().clone();
         map.insert("accessors".into(), self.accessors.into());
         map.insert("bufferViews".into(), self.views.into());
@@ -54,10 +54,10 @@ impl File {
     }
 }
 
-const SECONDS: f32 = 1.0;
+pub const SECONDS: f32 = 1.0;
 
 /// A body of three parts that walks in a bow while its left arm waves: below a node that is turned and scaled, as some programs write it.
-fn walker(end: f32) -> Vec<u8> {
+pub fn walker(end: f32) -> Vec<u8> {
     let mut f = File::default();
     let mesh = f.floats(&[0.0, 0.0, 0.0, 30.0, 0.0, 0.0, 0.0, 20.0, 10.0], "VEC3");
     let times: Vec<f32> = (0..=30).map(|k| k as f32 / 30.0 * SECONDS).collect();

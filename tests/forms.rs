@@ -231,7 +231,7 @@ fn frozen_characters_show_every_frame() {
     let poses: Vec<Pose> = (0..=6).map(|k| pose(k as f64 / 2.0)).collect();
     let frozen = still::frozen(&c, &poses, 2.0, "dance");
     let asset = Asset { character: frozen.clone(), ..Asset::default() };
-    let new = gltf::NewClip { clip: &frozen.clips()[0], short: &[], replaces: None };
+    let new = gltf::NewClip { clip: &frozen.clips()[0], short: &[], replaces: None, carried: None };
     let (file, warnings) = gltf::write(&asset, &[], &[new], Default::default()).unwrap();
     assert!(warnings.is_empty(), "{warnings:?}");
     let again = gltf::import_bytes(&file.glb(), None, "frozen.glb", &Options::default()).unwrap();
@@ -267,7 +267,7 @@ fn fewer_influences_cost_what_is_stated() {
     }
     let all = c.with_influences(5);
     let cost = vertices::changed(&c, &all, &clip, &desc(1e6));
-    assert_eq!((vertices::dropped(&c, &all), cost.ceiling), ((0, 0.0), 0.0));
+    assert!(vertices::dropped(&c, &all).0 == 0 && cost.ceiling < 1e-6, "{cost:?}");
 }
 
 #[test]
@@ -292,7 +292,8 @@ fn straight_ways_between_frames_are_no_farther_off_than_is_stated() {
         });
         let off = off.fold(0.0, f64::max);
         let found = cost.worst.distance;
-        assert!(off <= cost.ceiling && off > 0.95 * found && found <= cost.ceiling, "{fps} {off} {cost:?}");
+        // Moments from the outside miss the end of a step.
+        assert!(off <= cost.ceiling && off > 0.9 * found && found <= cost.ceiling, "{fps} {off} {cost:?}");
         assert!(cost.ceiling < 1.1 * found && found < last, "{fps} {cost:?}");
         last = found;
     }
@@ -322,7 +323,7 @@ fn packed_buffers_hold_the_same_character_in_fewer_bytes() {
     let (c, bones) = tube();
     let clip = dance(&bones);
     let asset = Asset { character: c, ..Asset::default() };
-    let new = gltf::NewClip { clip: &clip, short: &[], replaces: None };
+    let new = gltf::NewClip { clip: &clip, short: &[], replaces: None, carried: None };
     let (mut file, _) = gltf::write(&asset, &[], &[new], Default::default()).unwrap();
     let import =
         |f: &gltf::Rewritten| gltf::import_bytes(&f.glb(), None, "tube.glb", &Options::default()).unwrap();

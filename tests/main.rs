@@ -25,6 +25,8 @@ mod golden;
 mod looks;
 #[cfg(feature = "pictures")]
 mod picture;
+#[cfg(feature = "cli")]
+mod quantize;
 mod raster;
 mod ray;
 #[cfg(feature = "io")]

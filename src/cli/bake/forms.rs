@@ -228,8 +228,11 @@ fn frozen(
 ) -> Result<(), Failure> {
     let bad = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", input.display()));
     let character = still::frozen(&import.asset.character, poses, fps, name);
-    let clips: Vec<gltf::NewClip> =
-        character.clips().iter().map(|clip| gltf::NewClip { clip, short: &[], replaces: None }).collect();
+    let clips: Vec<gltf::NewClip> = character
+        .clips()
+        .iter()
+        .map(|clip| gltf::NewClip { clip, short: &[], replaces: None, carried: None })
+        .collect();
     let asset =
         Asset { character: character.clone(), materials: import.asset.materials.clone(), ..Asset::default() };
     let extras = Map::from_iter([("sinew".to_owned(), told.clone())]);

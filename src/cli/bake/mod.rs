@@ -240,7 +240,8 @@ fn one(
         let message = format!("{}: {}", input.display(), f.message());
         f.with_message(message)
     };
-    let edited = clips::edited(&args.edits, import, &chosen, &desc, say).map_err(placed)?;
+    let beyond = write::beyond(args, input, import)?;
+    let edited = clips::edited(&args.edits, import, &chosen, &beyond, &desc, say).map_err(placed)?;
     let limited = args.forms.limited(import, &edited, say);
     let import = limited.as_ref().map_or(import, |l| &l.0);
     if let Some(report) =

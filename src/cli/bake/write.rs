@@ -5,7 +5,7 @@ use super::{Args, fresh, to};
 use crate::cli::batch::{self, Names};
 use crate::cli::{Failure, say, say::Say};
 use serde_json::{Map, Value, json};
-use sinew::io::gltf::MeshForm;
+use sinew::io::gltf::{Carried, MeshForm};
 use sinew::io::picture::{AtomicFile, Folder};
 use sinew::io::{self, Import, gltf};
 use std::collections::BTreeMap;
@@ -128,11 +128,22 @@ pub(super) fn rewritten(
             clip: &d.baked.clip,
             short: &d.baked.short,
             replaces: d.edited.replaces.filter(|_| args.motion.is_empty()),
+            carried: Some(&d.edited.carried),
         })
         .collect();
     let name = input.display().to_string();
     let change = gltf::Change { clips: &clips, extras, influences: args.forms.limits() };
     gltf::changed(&bytes, Some(folder(input)), &name, import, change).map_err(|e| bad(&e))
+}
+
+/// What the input's clips move beside bones.
+pub(super) fn beyond(args: &Args, input: &Path, import: &Import) -> Result<Vec<Vec<Carried>>, Failure> {
+    if !args.motion.is_empty() || !import.extensions.iter().any(|e| e == "KHR_animation_pointer") {
+        return Ok(vec![]);
+    }
+    let bad = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", input.display()));
+    let bytes = io::read_file(input).map_err(|e| bad(&e))?;
+    gltf::carried(&bytes, Some(folder(input)), &input.display().to_string()).map_err(|e| bad(&e))
 }
 
 /// What the clips' edits leave to be said.

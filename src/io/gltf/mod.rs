@@ -36,6 +36,7 @@ mod warnings;
 mod wear;
 mod write;
 
+pub use carried::{Carried, carried};
 pub use error::GltfError;
 pub use quantize::{MeshForm, vertices_of};
 pub use rewrite::{Change, NewClip, Rewritten, changed};

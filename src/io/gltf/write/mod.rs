@@ -52,8 +52,8 @@ pub fn write(
     let nodes = nodes(&mut out, asset, &mut warnings)?;
     let moving: Vec<(Clip, Vec<bool>)> = clips.iter().map(|c| moving(&asset.character, c)).collect();
     let clips: Vec<NewClip> =
-        moving.iter().map(|(clip, short)| NewClip { clip, short, replaces: None }).collect();
-    out.animate(&nodes, &clips, &Value::Null)?;
+        moving.iter().map(|(clip, short)| NewClip { clip, short, replaces: None, carried: None }).collect();
+    out.animate(&nodes, &clips, &[], &Value::Null)?;
     // Lists that are empty are against the specification.
     out.json.retain(|_, v| v.as_array().is_none_or(|a| !a.is_empty()));
     Ok((out, warnings))
