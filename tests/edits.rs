@@ -431,6 +431,32 @@ fn channels_keep_what_is_said_of_them_and_those_of_others_stay() {
 }
 
 #[test]
+fn what_moves_no_bone_is_cut_turned_and_joined_with_the_rest() {
+    let (dir, [a, ..]) = folder();
+    let out = path(&dir, "out.glb");
+    let of = |options: &[&str]| {
+        let run = sinew(&[&["bake", &a, "-o", &out, "-q", "-f", "--tolerance", "5mm"], options].concat());
+        assert!(run.status.success(), "{}", text(&run.stderr));
+        let all = gltf::carried(&std::fs::read(&out).unwrap(), None, "out.glb").unwrap();
+        assert_eq!((all.len(), all[0].len()), (1, 1));
+        let curve = &all[0][0].curve;
+        let at = |t: f64| {
+            let mut v = [0.0; 3];
+            curve.sample(t, &mut v);
+            v[0]
+        };
+        (curve.times().to_vec(), curve.interpolation(), [0.1, 0.4, 0.6, 1.4, 1.6].map(at))
+    };
+    let hold = Interpolation::Hold;
+    assert_eq!(of(&[]), (vec![0.0, 1.0], hold, [1.0, 1.0, 1.0, 0.0, 0.0]));
+    assert_eq!(of(&["--speed", "2"]), (vec![0.0, 0.5], hold, [1.0, 1.0, 0.0, 0.0, 0.0]));
+    assert_eq!(of(&["--trim", "0.75.."]).2, [1.0, 0.0, 0.0, 0.0, 0.0].map(|v: f32| v));
+    assert_eq!(of(&["--reverse"]).2[1], 1.0);
+    let joined = of(&["--concat", "both"]);
+    assert_eq!(joined.2, [1.0, 1.0, 1.0, 0.0, 0.0]);
+}
+
+#[test]
 fn a_last_key_that_nobody_can_mean_is_told_and_costs_nothing() {
     let (dir, _) = folder();
     let far = path(&dir, "far.glb");

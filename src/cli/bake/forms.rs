@@ -4,15 +4,16 @@ use super::clips::Edited;
 use super::report::{self, Done};
 use super::write::{self, put_bytes};
 use super::{Args, failure, mesh, threads};
-use crate::cli::{Failure, say::Say};
+use crate::cli::{Failure, say, say::Say};
 use serde_json::{Map, Value, json};
 use sinew::asset::Asset;
 use sinew::bake::{self, BakeDesc, Baked, vertices};
+use sinew::character::Binding;
 use sinew::clip::Clip;
 use sinew::io::still::{self, Stance, Still};
 use sinew::io::{self, Import, gltf, obj, pc2, ply, sinew_clip, stl};
 use sinew::pose::Pose;
-use sinew::time::frame_count;
+use sinew::time::{Range, frame_count};
 use std::path::Path;
 
 /// The most frames of a form without bones.
@@ -21,14 +22,19 @@ const MOST_FRAMES: usize = 100_000;
 /// The most frames that are morph targets: their weights are a square of numbers.
 const MOST_TARGETS: usize = 2000;
 
+/// Options that are about curves.
+const CURVES: [&str; 9] =
+    ["tolerance", "metric", "pin", "fewest", "no_quantize", "keep_keys", "fps", "to", "additive"];
+
 #[derive(clap::Args)]
 pub(super) struct Forms {
     /// Write the character as it stands at this time: .glb, .gltf, .obj, .ply or .stl, in metres, closed where it was closed.
-    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, conflicts_with = "vertices")]
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, value_parser = moment, conflicts_with = "vertices",
+        conflicts_with_all = CURVES)]
     pose_at: Option<f64>,
     /// Write a clip for programs without skins, --vertices-fps frames a second: a morph target a frame (.glb, .gltf), or a point cache
     /// (.pc2) and the mesh that it moves (.obj).
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = CURVES)]
     vertices: bool,
     /// Frames a second of --vertices.
     #[arg(long, value_name = "FPS", default_value_t = 30.0, value_parser = rate, requires = "vertices")]
@@ -42,6 +48,10 @@ pub(super) struct Forms {
     /// Store vertices in integers (KHR_mesh_quantization), as coarse as a third of the tolerance allows; the clips have what that leaves.
     #[arg(long, conflicts_with_all = ["pose_at", "vertices"])]
     pub quantize_mesh: bool,
+}
+
+fn moment(text: &str) -> Result<f64, String> {
+    text.parse::<f64>().ok().filter(|t| t.is_finite()).ok_or_else(|| "expected a time in seconds".into())
 }
 
 fn rate(text: &str) -> Result<f64, String> {
@@ -67,6 +77,30 @@ impl Forms {
         }
     }
 
+    /// Refuse what an output of this name has no place for.
+    pub fn check(&self, args: &Args, name: &str) -> Result<(), Failure> {
+        let (file, all) = match ending(Path::new(name)).as_str() {
+            "json" => (".json rigs hold vertices and keys as text", false),
+            "sinew" => (".sinew files hold packed clips alone, whose keys are chosen by their bits", true),
+            _ => return Ok(()),
+        };
+        let given = [
+            ("--quantize-mesh", self.quantize_mesh),
+            ("--meshopt", self.meshopt),
+            ("--influences", all && self.influences.is_some()),
+            ("--no-quantize", all && args.no_quantize),
+            ("--fewest", all && args.fewest.is_some()),
+            ("--fps", all && args.edits.fps.is_some()),
+            ("--keep-keys", all && args.edits.keep_keys),
+        ];
+        match given.iter().find(|g| g.1) {
+            Some((option, _)) => {
+                Err(Failure::Usage(format!("{option}: {file}; name a .glb or leave it out")))
+            }
+            None => Ok(()),
+        }
+    }
+
     /// Write what is no curves in glTF, and tell what was written; none if that is not what is wanted.
     pub fn write(
         &self,
@@ -78,8 +112,12 @@ impl Forms {
         say: &Say,
     ) -> Result<Option<Value>, Failure> {
         let clips: Vec<&Clip> = edited.iter().map(|e| &e.clip).collect();
+        let solid = import.asset.character.meshes().iter().any(|m| !m.triangles.is_empty());
+        if !solid && (self.pose_at.is_some() || self.vertices) {
+            return Err(Failure::Input("there are no triangles that could be written".into()));
+        }
         let mut told = if let Some(t) = self.pose_at {
-            self.pose(args, paths, import, &clips, t)?
+            self.pose(args, paths, import, &clips, t, say)?
         } else if self.vertices {
             self.points(args, paths, import, &clips, say)?
         } else if ending(paths[1]) == "sinew" {
@@ -101,10 +139,18 @@ impl Forms {
         import: &Import,
         clips: &[&Clip],
         t: f64,
+        say: &Say,
     ) -> Result<Value, Failure> {
         let c = &import.asset.character;
         let mut pose = c.rest_pose();
-        clips.iter().take(1).for_each(|clip| clip.sample(c.skeleton(), t, &mut pose));
+        if let Some(clip) = clips.first() {
+            clip.sample(c.skeleton(), t, &mut pose);
+            let range = clip.playback();
+            if !(range.start..=range.end).contains(&t) {
+                let (name, Range { start, end }) = (say::name(&clip.name), range);
+                say.note(&format!("clip {name} runs from {start} to {end} s; this is its end"));
+            }
+        }
         let stance = Stance::new(c, &groups(import));
         let asset = &import.asset;
         let told = json!({"pose_at": t, "clip": clips.first().map(|c| &c.name)});
@@ -175,6 +221,9 @@ impl Forms {
     pub fn limited(&self, import: &Import, edited: &[Edited], say: &Say) -> Option<(Import, Value)> {
         let k = self.influences?;
         let c = &import.asset.character;
+        if !c.instances().iter().any(|i| matches!(i.binding, Binding::Skin { .. })) {
+            say.note("--influences: nothing is skinned");
+        }
         let less = c.with_influences(k.into());
         let (vertices, dropped) = vertices::dropped(c, &less);
         let (cost, _) =

@@ -42,12 +42,13 @@ Examples:
   sinew bake fox.glb -o fox.stl --pose-at 0.5           as it stands, for printing and sculpting
   sinew bake fox.glb -o fox.pc2 --vertices --clip Run   where each point is, frame by frame
   sinew bake fox.glb -o light.glb --influences 2
+  sinew bake fox.glb -o tiny.glb --quantize-mesh --meshopt   vertices in integers, same tolerance
   sinew bake fox.glb -o clips/{name}-{clip}.glb         each clip in a file of its own
 
 No vertex of the skin moves by more than the tolerance, at any time: vertices are compared at all keys, and between
 them until the second derivatives of the bones' motion leave no room for more. What was reached is printed and
-written into asset.extras.sinew. From glTF to glTF everything but the animations is carried through untouched. Where the bound cannot be kept, nothing is
-written and the exit code is 4.";
+written into asset.extras.sinew. From glTF to glTF everything but the animations is carried through untouched, unless
+an option says otherwise. Where the bound cannot be kept, nothing is written and the exit code is 4.";
 
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
@@ -102,6 +103,7 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     let mut names = Names::new(&args.output)?;
     write::check_name(&names.example(), args.forms.endings())?;
     args.to.form(Path::new(&names.example()))?;
+    args.forms.check(args, &names.example())?;
     names.tell_apart(args.inputs.len())?;
     let many = args.inputs.len() > 1 || names.template.tells_clips();
     let (mut outcome, mut told) = (Outcome::default(), vec![]);
