@@ -41,14 +41,18 @@ fn size(file: &str) -> u64 {
     std::fs::metadata(file).unwrap().len()
 }
 
-/// All vertices in a clip's pose, mesh by mesh.
-fn places(import: &Import, clip: usize, t: f64) -> Vec<DVec3> {
+/// All vertices in a clip's pose, instance by instance or mesh by mesh.
+fn placed(import: &Import, clip: usize, t: f64, by_mesh: bool) -> Vec<DVec3> {
     let c = &import.asset.character;
     let pose = c.pose(Some(clip), t);
     let bones = fk::forward_f64(c.skeleton(), &pose);
     let mut order: Vec<usize> = (0..c.instances().len()).collect();
-    order.sort_by_key(|i| (import.primitives[*i].mesh, import.primitives[*i].primitive));
+    order.sort_by_key(|i| by_mesh.then(|| (import.primitives[*i].mesh, import.primitives[*i].primitive)));
     order.into_iter().flat_map(|i| c.positions_f64(i, &pose, &bones)).collect()
+}
+
+fn places(import: &Import, clip: usize, t: f64) -> Vec<DVec3> {
+    placed(import, clip, t, false)
 }
 
 fn apart(a: &[DVec3], b: &[DVec3]) -> f64 {
@@ -60,7 +64,7 @@ fn apart(a: &[DVec3], b: &[DVec3]) -> f64 {
 fn over_time(a: &Import, b: &Import) -> f64 {
     let clip = |i: &Import| i.asset.character.clips().iter().position(|c| c.name == "walk").unwrap();
     let times = (0..60).map(|k| k as f64 * 0.96 / 60.0);
-    times.map(|t| apart(&places(a, clip(a), t), &places(b, clip(b), t))).fold(0.0, f64::max)
+    times.map(|t| apart(&placed(a, clip(a), t, true), &placed(b, clip(b), t, true))).fold(0.0, f64::max)
 }
 
 /// The farthest that any of `points` is from the nearest of `places`.

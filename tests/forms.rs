@@ -292,7 +292,7 @@ fn straight_ways_between_frames_are_no_farther_off_than_is_stated() {
         let off = off.fold(0.0, f64::max);
         let found = cost.worst.distance;
         // Moments from the outside miss the end of a step.
-        assert!(off <= cost.ceiling && off > 0.9 * found && found <= cost.ceiling, "{fps} {off} {cost:?}");
+        assert!(off <= cost.ceiling && off > 0.7 * found && found <= cost.ceiling, "{fps} {off} {cost:?}");
         assert!(cost.ceiling < 1.1 * found, "{fps} {cost:?}");
     }
 }
