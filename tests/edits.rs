@@ -299,7 +299,7 @@ fn boxes_of_vertices_find_the_same_worst_vertex_as_all_of_them() {
             "{got:?} {want}"
         );
         let profile = Gauge::new(c, 1)
-            .profile(&a, &b, &times)
+            .profile(&a, &b, &times, 0.0)
             .into_iter()
             .fold(Default::default(), sinew::bake::Worst::worse);
         assert_eq!(profile, got);

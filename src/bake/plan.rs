@@ -14,6 +14,12 @@ pub(super) const SEARCH_MOMENTS: usize = 400;
 /// Vertices times moments that the search may compare in all.
 const SEARCH_WORK: usize = 400_000_000;
 
+/// What the search goes for, as a part of what is allowed: what lies between its moments may be a little more.
+const AIM: f64 = 0.97;
+
+/// And where they leave out keys.
+const SPARSE_AIM: f64 = 0.94;
+
 /// Largest error of a normalised 16-bit quaternion, radians, and of its interpolation.
 const SHORT_ERROR: f64 = 7e-5;
 
@@ -39,6 +45,8 @@ pub(super) struct Plan<'a> {
     jobs: Vec<Job>,
     share: f64,
     moments: Vec<f64>,
+    /// Whether the moments leave out keys, so that more may hide between them.
+    sparse: bool,
     vertices: usize,
 }
 
@@ -72,48 +80,52 @@ impl<'a> Plan<'a> {
             jobs.push(job);
         }
         let moments = times::coarse(clip, SEARCH_MOMENTS);
-        Self { clip, desc: desc.clone(), jobs, share: 0.5, moments, vertices }
+        let sparse = times::knots(&[clip]).len() > SEARCH_MOMENTS;
+        Self { clip, desc: desc.clone(), jobs, share: 0.5, moments, sparse, vertices }
     }
 
     /// The largest shares that keep the bound at the search's moments: all together first, then one after the other.
     pub fn search(&mut self, gauge: &Gauge) -> Baked {
-        let aim = 0.97;
+        let aim = if self.sparse { SPARSE_AIM } else { AIM };
         let looks = gauge.looks(self.clip, &self.moments);
-        let mut best = 0.0;
-        let (mut low, mut high) = (1e-4, f64::INFINITY);
-        for _ in 0..14 {
-            self.make_all(gauge, true);
-            let error = gauge.worst_of(&looks, &self.assemble()).share();
+        self.narrow(gauge, &looks, aim, true);
+        self.narrow(gauge, &looks, aim, false);
+        self.widen(gauge, &looks, aim);
+        self.finish()
+    }
+
+    /// Bring the share close to the largest that keeps `aim`.
+    fn narrow(&mut self, gauge: &Gauge, looks: &Looks, aim: f64, draft: bool) {
+        let (mut low, mut high) = (0.0, f64::INFINITY);
+        let mut best = None;
+        for _ in 0..if draft { 14 } else { 6 } {
+            self.make_all(gauge, draft);
+            let error = gauge.most(looks, &self.assemble());
             if error <= aim {
-                (best, low) = (self.share, self.share);
+                low = self.share;
+                best = Some((low, self.jobs.iter().map(|j| j.made.clone()).collect::<Vec<_>>()));
             } else {
                 high = self.share;
             }
-            if high < 1.03 * low {
+            // Drafts only show the neighbourhood.
+            let enough = error <= aim && error > aim * if draft { 0.85 } else { 0.95 };
+            if enough || high < 1.05 * low {
                 break;
             }
             // Errors grow about as the share does.
-            let guess = self.share * 0.98 * aim / error.max(1e-30);
-            self.share = if high.is_infinite() {
-                guess.clamp(1.3 * low, 4.0 * low)
-            } else if guess > 1.01 * low && guess < 0.99 * high {
+            let guess = (self.share * 0.98 * aim / error.max(1e-30)).min(4.0 * self.share);
+            self.share = if guess > 1.02 * low && guess < 0.99 * high {
                 guess
+            } else if low > 0.0 {
+                (low * high.min(1.7 * low)).sqrt()
             } else {
-                (low * high).sqrt()
+                0.5 * self.share
             };
         }
-        self.share = best;
-        for _ in 0..6 {
-            self.make_all(gauge, false);
-            let error = gauge.worst_of(&looks, &self.assemble()).share();
-            if error <= aim {
-                break;
-            }
-            // Drafts make a little less of what they are allowed.
-            self.share *= 0.99 * aim / error;
+        if let Some((share, made)) = best {
+            self.share = share;
+            self.jobs.iter_mut().zip(made).for_each(|(job, made)| job.made = made);
         }
-        self.widen(gauge, &looks, aim);
-        self.finish()
     }
 
     /// The same with more moments.

@@ -6,8 +6,12 @@ use crate::clip::Clip;
 
 /// Two motions of the same points.
 pub(super) trait Motions: Sync {
-    /// How far they are apart at each of these times.
-    fn apart(&self, times: &[f64]) -> Vec<Worst>;
+    /// How far they are apart at each of these times; what is below this share of the limit may be told as that.
+    fn apart(&self, times: &[f64], floor: f64) -> Vec<Worst>;
+    /// How far at any of them, where that is less work than to tell each.
+    fn worst(&self, _times: &[f64]) -> Worst {
+        Worst::default()
+    }
     /// The largest second derivative of the way from one to the other between two moments, as a part of the limit.
     fn bend(&self, times: [f64; 2]) -> f64;
     /// The end of a span as seen from within it: just before, where something jumps there.
@@ -22,8 +26,12 @@ struct Clips<'a> {
 }
 
 impl Motions for Clips<'_> {
-    fn apart(&self, times: &[f64]) -> Vec<Worst> {
-        self.gauge.profile(self.clips[0], self.clips[1], times)
+    fn apart(&self, times: &[f64], floor: f64) -> Vec<Worst> {
+        self.gauge.profile(self.clips[0], self.clips[1], times, floor)
+    }
+
+    fn worst(&self, times: &[f64]) -> Worst {
+        self.gauge.worst(self.clips[0], self.clips[1], times)
     }
 
     fn bend(&self, times: [f64; 2]) -> f64 {
@@ -43,6 +51,12 @@ const BRACKET: f64 = 1.02;
 
 /// Rounds of halving that only bring the bound closer, and gaps in each.
 const CLOSER: [usize; 2] = [12, 64];
+
+/// Every so many moments are looked at first, for what the worst will be near.
+const FIRST: usize = 16;
+
+/// Shares below this part of the worst are not told apart.
+const SHOWN: f64 = 0.6;
 
 /// Moments over the limit that are told of.
 const OVER: usize = 64;
@@ -115,15 +129,21 @@ pub(super) fn bracket(gauge: &Gauge, knots: &[f64], motions: &impl Motions) -> V
 }
 
 impl Verdict {
-    /// The shares at these moments.
+    /// What the shares at these moments do not exceed.
     fn look(&mut self, motions: &impl Motions, times: &[f64]) -> Vec<f64> {
-        let found = motions.apart(times);
+        if self.moments == 0 {
+            let first: Vec<f64> = times.iter().copied().step_by(FIRST).collect();
+            self.worst = motions.worst(&first);
+        }
+        // Shares far below the worst need not be known exactly.
+        let floor = SHOWN * self.worst.share();
+        let found = motions.apart(times, floor);
         self.moments += times.len();
         self.worst = found.iter().copied().fold(self.worst, Worst::worse);
         let mut over: Vec<&Worst> = found.iter().filter(|w| w.share() > 1.0).collect();
         over.sort_by(|a, b| b.share().total_cmp(&a.share()).then(a.time.total_cmp(&b.time)));
         self.over.extend(over.iter().take(OVER).map(|w| w.time));
-        found.iter().map(Worst::share).collect()
+        found.iter().map(|w| w.share().max(floor)).collect()
     }
 
     /// A bound for all of the time between the first and the last knot.

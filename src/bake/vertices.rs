@@ -86,7 +86,7 @@ struct Changed<'a> {
 }
 
 impl Motions for Changed<'_> {
-    fn apart(&self, times: &[f64]) -> Vec<Worst> {
+    fn apart(&self, times: &[f64], _floor: f64) -> Vec<Worst> {
         self.gauge.map(times, |time| {
             let c = self.gauge.character;
             let pose = self.gauge.pose(self.clip, time);
@@ -136,7 +136,7 @@ impl Straight<'_> {
 }
 
 impl Motions for Straight<'_> {
-    fn apart(&self, times: &[f64]) -> Vec<Worst> {
+    fn apart(&self, times: &[f64], _floor: f64) -> Vec<Worst> {
         self.gauge.map(times, |time| {
             let next = self.frames.partition_point(|f| *f <= time).min(self.frames.len() - 1);
             let (a, b) = (self.frames[next.saturating_sub(1)], self.frames[next]);

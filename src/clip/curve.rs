@@ -232,7 +232,7 @@ impl Curve {
         if matches!(self.interpolation, Interpolation::Hold | Interpolation::Linear) {
             return 0.0;
         }
-        let k = self.times.partition_point(|&k| k <= t);
+        let k = self.after(t);
         if k == 0 || k == self.times.len() {
             return 0.0;
         }
@@ -247,9 +247,19 @@ impl Curve {
         ((6.0 - 12.0 * u) * rise / h + (6.0 * u - 4.0) * m0 + (6.0 * u - 2.0) * m1) / h
     }
 
+    /// The first key after `t`, or the number of keys.
+    fn after(&self, t: f64) -> usize {
+        let keys = &self.times[..];
+        let [first, last] = [keys[0], keys[keys.len() - 1]];
+        // Most keys are equally far apart.
+        let guess = ((t - first) / (last - first) * (keys.len() - 1) as f64) as usize + 1;
+        let hit = guess < keys.len() && keys[guess - 1] <= t && t < keys[guess];
+        if hit { guess } else { keys.partition_point(|&k| k <= t) }
+    }
+
     fn locate(&self, t: f64) -> Place {
         // The last key at or before t: of keys at one time the last wins.
-        let after = self.times.partition_point(|&k| k <= t);
+        let after = self.after(t);
         if after == 0 {
             return Place::Key(self.times.partition_point(|&k| k <= self.times[0]) - 1);
         }
