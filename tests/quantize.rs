@@ -267,3 +267,57 @@ fn integers_and_clips_share_one_tolerance() {
     let (code, said) = baked(&dir, "rigs/pip.json", &["--quantize-mesh"]).unwrap_err();
     assert!(code == Some(2) && said.contains("bake to a .glb first"), "{said}");
 }
+
+/// A triangle that swells for a second, by weights of so many bits.
+fn swelling(bits: usize) -> Vec<u8> {
+    let mut f = File::default();
+    let triangle = f.floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0], "VEC3");
+    let shift = f.floats(&[0.0, 0.0, 1.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0], "VEC3");
+    let times = f.floats(&(0..=40).map(|k| k as f32 / 40.0).collect::<Vec<f32>>(), "SCALAR");
+    let unit = ((1u32 << bits) - 1) as f32;
+    let value = |k: usize| ((k as f32 * 0.37).sin().abs() * unit).round() as u32;
+    let bytes: Vec<u8> = (0..=40).flat_map(|k| value(k).to_le_bytes()[..bits / 8].to_vec()).collect();
+    f.views.push(json!({"buffer": 0, "byteOffset": f.bin.len(), "byteLength": bytes.len()}));
+    f.bin.extend(bytes);
+    f.bin.resize(f.bin.len().next_multiple_of(4), 0);
+    let code = if bits == 8 { 5121 } else { 5123 };
+    f.accessors.push(json!({"componentType": code, "normalized": true, "count": 41, "type": "SCALAR", "bufferView": f.views.len() - 1}));
+    let weights = f.accessors.len() - 1;
+    f.done(json!({
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"name": "flag", "mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": triangle}, "targets": [{"POSITION": shift}]}]}],
+        "animations": [{"name": "swell", "samplers": [{"input": times, "output": weights}],
+            "channels": [{"sampler": 0, "target": {"node": 0, "path": "weights"}}]}],
+    }))
+}
+
+#[test]
+fn weights_that_were_integers_stay_integers() {
+    let dir = tempfile::tempdir().unwrap();
+    let input = path(&dir, "in.glb");
+    for bits in [8, 16] {
+        std::fs::write(&input, swelling(bits)).unwrap();
+        // So little that every key is needed.
+        for (tolerance, same) in [("0.000000001", true), ("1%", false)] {
+            let bytes = baked(&dir, &input, &["--tolerance", tolerance]).unwrap();
+            let json: Value = serde_json::from_slice(
+                &bytes[20..20 + u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize],
+            )
+            .unwrap();
+            let output = json["animations"][0]["samplers"][0]["output"].as_u64().unwrap() as usize;
+            let accessor = &json["accessors"][output];
+            let code = if bits == 8 || !same { 5121 } else { 5123 };
+            assert_eq!(
+                (&accessor["componentType"], &accessor["normalized"]),
+                (&json!(code), &json!(true)),
+                "{bits} {tolerance}"
+            );
+            assert!(accessor["count"].as_u64().unwrap() <= 41);
+            let (a, b) = (import(&swelling(bits)), import(&bytes));
+            let off = apart(&a, &b);
+            assert!(if same { off < 1e-9 } else { off < 0.02 && off > 1e-3 }, "{off}");
+        }
+    }
+}

@@ -308,7 +308,12 @@ fn packed(
     let (mut packed, mut done) = (vec![], vec![]);
     for e in edited {
         let one = bake::pack(c, &e.clip, desc).map_err(failure)?;
-        done.push(Done { edited: e, baked: Baked { report: one.report, ..Baked::default() }, mesh: 0.0 });
+        done.push(Done {
+            edited: e,
+            baked: Baked { report: one.report, ..Baked::default() },
+            allowed: desc.tolerance,
+            mesh: 0.0,
+        });
         packed.push((e.clip.name.as_str(), one.packed));
     }
     let all: Vec<_> = packed.iter().map(|(name, p)| (*name, p)).collect();

@@ -9,7 +9,7 @@ use sinew::bake::vertices::{self, Cost};
 use sinew::character::{Binding, Character};
 use sinew::clip::Clip;
 use sinew::io::gltf::{self, MeshForm};
-use sinew::io::{Import, Options};
+use sinew::io::{Import, Options, PrimitiveSource};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -45,55 +45,69 @@ pub(super) fn quantized(
     let bad = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", input.display()));
     let file = write::rewritten(args, input, import, &[], Default::default())?;
     if let Some(extension) = file.stranger() {
-        let message = format!("--quantize-mesh: `{extension}` may say more of the vertices; remove it first");
-        return Err(Failure::Usage(message));
+        return Err(write::stranger("--quantize-mesh", extension));
     }
+    let asked = BakeDesc { tolerance: PART * desc.tolerance, ..desc.clone() };
     let mut forms = BTreeMap::new();
-    let limit = PART * desc.tolerance;
-    for tries in 0.. {
-        let mut out = file.clone();
-        let groups = out.quantize(&forms).map_err(|e| bad(&e))?;
-        let name = input.display().to_string();
-        let other = gltf::import_bytes(&out.glb(), None, &name, &Options { textures: false });
-        let other = other.map_err(|e| bad(&e))?;
-        let character = gltf::vertices_of(import, &other).ok_or_else(|| {
-            bad(&"--quantize-mesh: its vertices cannot be compared with what becomes of them")
-        })?;
-        let cost = worst(
-            &import.asset.character,
-            &character,
-            edited,
-            &BakeDesc { tolerance: limit, ..desc.clone() },
-        );
-        let Some(instance) = cost.1.filter(|_| cost.0.ceiling > limit) else {
-            let error = cost.0.ceiling;
-            let told = told(&out, import, &character, &cost.0, limit);
-            say.note(&format!(
-                "vertices in integers: at most {:.4} mm off; {} of {} meshes have 16-bit positions, normals are up to {:.2}° off",
-                1e3 * error, told["positions16"], told["meshes"], told["normals"].as_f64().unwrap_or(0.0),
-            ));
-            return Ok(Quantized { character, forms, error, told });
-        };
-        let at = groups[import.primitives[instance].mesh as usize];
-        let skinned = |g: usize| {
-            let mut of = import.primitives.iter().zip(import.asset.character.instances());
-            of.any(|(p, i)| groups[p.mesh as usize] == g && matches!(i.binding, Binding::Skin { .. }))
-        };
-        let these: Vec<usize> = if tries < TRIES { vec![at] } else { groups.clone() };
-        for g in these {
-            let form: &mut MeshForm = forms.entry(g).or_default();
-            *form = finer(*form, skinned(g)).unwrap_or(*form);
+    for tries in 0..TRIES + 5 {
+        let trial = tried(import, &file, &forms, edited, &asked).map_err(|e| bad(&e))?;
+        if trial.cost.ceiling <= asked.tolerance {
+            return Ok(trial.told(import, forms, asked.tolerance, say));
         }
-        if tries > TRIES + 5 {
-            return Err(Failure::Differs(format!(
-                "{}: --quantize-mesh: {:.4} mm off where a third of the tolerance is {:.4} mm; ask for more",
-                input.display(),
-                1e3 * cost.0.ceiling,
-                1e3 * limit,
-            )));
+        let group = |p: &PrimitiveSource| trial.groups[p.mesh as usize];
+        let to_blame = trial.instance.filter(|_| tries < TRIES).map(|i| group(&import.primitives[i]));
+        for g in trial.groups.iter().copied().filter(|g| to_blame.is_none_or(|b| b == *g)) {
+            let mut of = import.primitives.iter().zip(import.asset.character.instances());
+            let skinned = of.any(|(p, i)| group(p) == g && matches!(i.binding, Binding::Skin { .. }));
+            let form: &mut MeshForm = forms.entry(g).or_default();
+            *form = finer(*form, skinned).unwrap_or(*form);
         }
     }
-    unreachable!("it ends within")
+    let input = input.display();
+    Err(Failure::Differs(format!(
+        "{input}: --quantize-mesh: its vertices cannot be stored within {:.3e} m; ask for more, or leave it out",
+        asked.tolerance,
+    )))
+}
+
+/// Vertices in some forms, and the clip in which they cost most.
+struct Trial {
+    out: gltf::Rewritten,
+    groups: Vec<usize>,
+    character: Character,
+    cost: Cost,
+    instance: Option<usize>,
+}
+
+fn tried(
+    import: &Import,
+    file: &gltf::Rewritten,
+    forms: &BTreeMap<usize, MeshForm>,
+    edited: &[Edited],
+    desc: &BakeDesc,
+) -> Result<Trial, String> {
+    let mut out = file.clone();
+    let groups = out.quantize(forms).map_err(|e| e.to_string())?;
+    let other = gltf::import_bytes(&out.glb(), None, "vertices in integers", &Options { textures: false });
+    let character = gltf::vertices_of(import, &other.map_err(|e| e.to_string())?)
+        .ok_or("--quantize-mesh: its vertices cannot be compared with what becomes of them")?;
+    let (cost, instance) = worst(&import.asset.character, &character, edited, desc);
+    Ok(Trial { out, groups, character, cost, instance })
+}
+
+impl Trial {
+    fn told(self, import: &Import, forms: BTreeMap<usize, MeshForm>, limit: f64, say: &Say) -> Quantized {
+        let told = told(&self.out, import, &self.character, &self.cost, limit);
+        let error = self.cost.ceiling;
+        say.note(&format!(
+            "vertices in integers: at most {:.4} mm off; {} of {} meshes have 16-bit positions, normals are up to {:.2}° off",
+            1e3 * error,
+            told["positions16"],
+            told["meshes"],
+            told["normals"].as_f64().unwrap_or(0.0),
+        ));
+        Quantized { character: self.character, forms, error, told }
+    }
 }
 
 /// The next of the forms, coarsest first: 8 bits of weight cost most, then the rest about as much as each other.

@@ -257,13 +257,13 @@ fn one(
         args.forms.quantize_mesh.then(|| mesh::quantized(args, input, import, &edited, &desc, say));
     let quantized = quantized.transpose()?;
     let character = quantized.as_ref().map_or(&import.asset.character, |q| &q.character);
-    let mesh = quantized.as_ref().map_or(0.0, |q| q.error);
-    let left = desc.tolerance - if desc.metric == Metric::Vertices { mesh } else { 0.0 };
+    let mesh = quantized.as_ref().filter(|_| desc.metric == Metric::Vertices).map_or(0.0, |q| q.error);
+    let allowed = desc.tolerance - mesh;
     let bar = say.clip_progress(edited.len());
     let mut done = vec![];
     for e in &edited {
         tell_coarse_times(&e.clip, say);
-        let desc = BakeDesc { tolerance: left, cycle: e.cycle, over: e.over.clone(), ..desc.clone() };
+        let desc = BakeDesc { tolerance: allowed, cycle: e.cycle, over: e.over.clone(), ..desc.clone() };
         let poses = AtomicUsize::new(0);
         let watch = |stage: Stage, n: usize| {
             let all = poses.fetch_add(n, Ordering::Relaxed) + n;
@@ -272,7 +272,7 @@ fn one(
             bar.set_message(format!("{}, {clip}: {doing}, {all} poses compared", input.display()));
         };
         let baked = to::bake(form, character, &e.clip, &desc, &watch);
-        done.push(Done { edited: e, baked: baked.map_err(failure).map_err(placed)?, mesh });
+        done.push(Done { edited: e, baked: baked.map_err(failure).map_err(placed)?, allowed, mesh });
         bar.inc(1);
     }
     bar.finish_and_clear();

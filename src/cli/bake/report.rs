@@ -11,17 +11,22 @@ use sinew::io::Import;
 pub(super) struct Done<'a> {
     pub edited: &'a Edited,
     pub baked: Baked,
-    /// Metres that its vertices are off already, because they are stored in integers.
+    /// Metres that any point may be off; pins may less.
+    pub allowed: f64,
+    /// Metres that vertices are off besides, because they are stored in integers.
     pub mesh: f64,
 }
 
 impl Done<'_> {
-    /// Metres that nothing exceeds, and those that are allowed.
+    /// Metres that no point but pins exceeds, and those that are allowed.
     fn error(&self) -> [f64; 2] {
-        let r = &self.baked.report;
-        // Points on bones are where they were.
-        let mesh = if matches!(r.worst.spot, Some(Spot::Bone(_))) { 0.0 } else { self.mesh };
-        [r.ceiling * r.worst.limit + mesh, r.worst.limit + mesh]
+        [self.baked.report.ceiling, 1.0].map(|share| share * self.allowed + self.mesh)
+    }
+
+    /// Where the worst is a pin, how far it is off and how far it may, metres.
+    fn pin(&self) -> Option<[f64; 2]> {
+        let worst = &self.baked.report.worst;
+        (worst.spot.is_some() && worst.limit != self.allowed).then_some([worst.distance, worst.limit])
     }
 }
 
@@ -49,10 +54,12 @@ pub(super) fn line(import: &Import, done: &Done, diagonal: f64) -> String {
     if r.worst.spot.is_none() && error == 0.0 {
         return format!("{made}; nothing is off");
     }
+    let pin = done.pin().map(|p| p.map(|m| 1e3 * m));
     format!(
-        "{made}; at most {:.4} mm off ({:.4}% of the diagonal), at {:.3} s on {}",
+        "{made}; at most {:.4} mm off ({:.4}% of the diagonal), {} at {:.3} s on {}",
         1e3 * error,
         100.0 * error / diagonal.max(1e-30),
+        pin.map_or("worst".into(), |[off, may]| format!("worst a pin, by {off:.4} of {may:.4} mm,")),
         r.worst.time,
         say::name(&bone_of(import, &done.baked)),
     )
@@ -85,6 +92,9 @@ pub(super) fn report(import: &Import, done: &[Done], args: &Args, desc: &BakeDes
             "bytes": r.bytes,
             "loop": d.edited.cycle,
         });
+        if let Some([off, may]) = d.pin() {
+            told["pin"] = json!({"measured": off, "limit": may});
+        }
         if let Some(motion) = &d.edited.motion {
             told["rootMotion"] = import.asset.character.skeleton().name(motion.bone).into();
         }

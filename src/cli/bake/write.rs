@@ -87,7 +87,10 @@ pub(super) fn write(
         out.quantize(forms).map_err(bad)?;
     }
     // What came packed does not grow.
-    if args.forms.meshopt || import.extensions.iter().any(|e| e == "EXT_meshopt_compression") {
+    if let Some(extension) = out.stranger().filter(|_| args.forms.meshopt) {
+        return Err(stranger("--meshopt", extension));
+    }
+    if args.forms.meshopt || import.extensions.iter().any(|e| e.ends_with("_meshopt_compression")) {
         out.compress().map_err(bad)?;
     }
     put(args, output, &out)
@@ -134,6 +137,14 @@ pub(super) fn rewritten(
     let name = input.display().to_string();
     let change = gltf::Change { clips: &clips, extras, influences: args.forms.limits() };
     gltf::changed(&bytes, Some(folder(input)), &name, import, change).map_err(|e| bad(&e))
+}
+
+/// Bytes cannot move where more may be said of them than is known.
+pub(super) fn stranger(option: &str, extension: &str) -> Failure {
+    let message = format!(
+        "{option}: `{extension}` may say where bytes are; take it out of the file first, or leave {option} out"
+    );
+    Failure::Usage(message)
 }
 
 /// What the input's clips move beside bones.

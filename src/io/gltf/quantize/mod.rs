@@ -18,7 +18,7 @@ use super::warnings::Warnings;
 pub use measured::vertices_of;
 
 use ::gltf::json::accessor::Type;
-use glam::{Affine3A, DVec3, Vec3};
+use glam::{Affine3A, DVec3, DVec4, Vec3};
 use pool::{Int, Pool};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -116,16 +116,17 @@ impl Work<'_> {
             return Ok(());
         }
         if let Some((group, grid)) = grid {
-            let center = grid.center.to_array().map(f64::from);
-            let of = move |k: usize, v: f32| (v as f64 - center[k]) / grid.scale as f64;
+            let (center, scale) = (grid.center.as_dvec3().extend(0.0), grid.scale as f64);
+            let of = move |v: DVec4| (v - center) / scale;
             self.integers(&mut primitive["attributes"], "POSITION", Int::I16, group, true, of)?;
-            let of = move |_: usize, v: f32| v as f64 / grid.scale as f64;
+            let of = move |v: DVec4| v / scale;
             for target in primitive.get_mut("targets").and_then(Value::as_array_mut).into_iter().flatten() {
                 self.integers(target, "POSITION", Int::I16, group, true, of)?;
             }
             self.quantized = true;
         }
-        let plain = |_: usize, v: f32| v as f64;
+        let plain = |v: DVec4| v;
+        let unit = |v: DVec4| v.truncate().normalize_or(v.truncate()).extend(v.w);
         let lists = [&primitive["attributes"]]
             .into_iter()
             .chain(primitive["targets"].as_array().into_iter().flatten());
@@ -134,7 +135,9 @@ impl Work<'_> {
             for key in keys(list) {
                 let is = |name: &str| key.starts_with(name);
                 if is("NORMAL") || is("TANGENT") {
-                    self.quantized |= self.integers(list, &key, Int::I8, 0, false, plain)?;
+                    // What morph targets add has any length.
+                    let of: &dyn Fn(DVec4) -> DVec4 = if i == 0 { &unit } else { &plain };
+                    self.quantized |= self.integers(list, &key, Int::I8, usize::from(i > 0), false, of)?;
                 } else if i == 0 && (is("TEXCOORD_") || is("COLOR_")) {
                     self.integers(list, &key, Int::U16, 0, false, plain)?;
                 }
@@ -158,7 +161,7 @@ impl Work<'_> {
         int: Int,
         group: usize,
         bounds: bool,
-        of: impl Fn(usize, f32) -> f64,
+        of: impl Fn(DVec4) -> DVec4,
     ) -> Result<bool> {
         let Some(from) = self.float(&attributes[key]) else { return Ok(false) };
         let tag = (vec![from], int, group, key.starts_with("POSITION"));
@@ -169,8 +172,12 @@ impl Work<'_> {
         let shapes = [Type::Vec2, Type::Vec3, Type::Vec4];
         let elements = self.doc.floats(from as usize, &shapes, key)?;
         let least = if int.signed() { -1.0 } else { 0.0 };
-        let values: Vec<f64> =
-            elements.values.iter().enumerate().map(|(i, v)| of(i % elements.width, *v)).collect();
+        let width = elements.width;
+        let row = |v: &[f32]| {
+            let at = |k: usize| v.get(k).copied().unwrap_or(0.0) as f64;
+            of(DVec4::new(at(0), at(1), at(2), at(3))).to_array().into_iter().take(width)
+        };
+        let values: Vec<f64> = elements.iter().flat_map(row).collect();
         // Rounding alone may lead a little beyond.
         if !values.iter().all(|v| (least - 1e-6..=1.0 + 1e-6).contains(v)) {
             return Ok(false);
@@ -180,7 +187,7 @@ impl Work<'_> {
         let accessor = self.accessor(from);
         let sparse = accessor.get("sparse").is_some() && accessor.get("bufferView").is_none();
         let base = self.count();
-        let done = self.pool.vertices(base, &numbers, elements.width, int, bounds, sparse);
+        let done = self.pool.vertices(base, &numbers, width, int, bounds, sparse);
         list(self.json, "accessors").push(done);
         self.pool.remember(tag, vec![base]);
         attributes[key] = base.into();
