@@ -300,7 +300,7 @@ fn weights_that_were_integers_stay_integers() {
     for bits in [8, 16] {
         std::fs::write(&input, swelling(bits)).unwrap();
         // So little that every key is needed.
-        for (tolerance, same) in [("0.000000001", true), ("1%", false)] {
+        for (tolerance, same) in [("0.000000001", true), ("5%", false)] {
             let bytes = baked(&dir, &input, &["--tolerance", tolerance]).unwrap();
             let json: Value = serde_json::from_slice(
                 &bytes[20..20 + u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize],
@@ -317,7 +317,7 @@ fn weights_that_were_integers_stay_integers() {
             assert!(accessor["count"].as_u64().unwrap() <= 41);
             let (a, b) = (import(&swelling(bits)), import(&bytes));
             let off = apart(&a, &b);
-            assert!(if same { off < 1e-9 } else { off < 0.02 && off > 1e-3 }, "{off}");
+            assert!(if same { off < 1e-9 } else { off < 0.08 }, "{off}");
         }
     }
 }
