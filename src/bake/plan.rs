@@ -42,7 +42,7 @@ struct Job {
 #[derive(Clone)]
 struct Made {
     curve: Curve,
-    /// Whether its values are 16-bit integers.
+    /// Whether its values are integers in the file.
     short: bool,
     form: Form,
     /// By how much wider pieces were tried (see [`fit::fitted`]).
@@ -289,7 +289,12 @@ pub(super) fn bytes(clip: &Clip, short: &[bool]) -> usize {
         if times.insert(bits) {
             sum += 4 * track.curve.times().len();
         }
-        sum += track.curve.values().len() * if short.get(i) == Some(&true) { 2 } else { 4 };
+        let bits = match track.target {
+            _ if short.get(i) != Some(&true) => 32,
+            Target::Weights { .. } => track.curve.integers().map_or(32, |form| form.bits),
+            _ => 16,
+        };
+        sum += track.curve.values().len() * bits / 8;
     }
     sum
 }
@@ -314,12 +319,16 @@ impl Job {
 
     /// The fewest keys within `allowed`.
     fn reduced(&self, allowed: f64, desc: &BakeDesc, effort: Effort) -> Option<Made> {
-        let (s, quantize, goal) = (&self.samples, desc.quantize, desc.goal);
+        let (s, goal) = (&self.samples, desc.goal);
         if s.is_constant(&self.rest, allowed) {
             return None;
         }
-        let short = quantize && s.kind == Kind::Rotation && SHORT_ERROR < 0.3 * allowed;
-        let stored = |v: &[f32]| if short { v.iter().map(|x| shortened(*x)).collect() } else { v.to_vec() };
+        let unit = self.unit(allowed).filter(|_| desc.quantize);
+        let short = unit.is_some();
+        let stored = |v: &[f32]| match unit {
+            Some(unit) => v.iter().map(|x| (x * unit).round().clamp(-unit, unit) / unit).collect(),
+            None => v.to_vec(),
+        };
         let made = |curve, short, form| Made { curve, short, form, wider: 1.0 };
         let first = stored(s.value(0));
         if s.is_constant(&first, allowed) {
@@ -330,11 +339,7 @@ impl Job {
             // Slopes need more than 16 bits hold.
             let source = self.source.with_slopes();
             let short = short && source.interpolation() != Interpolation::Hermite;
-            let values = if short {
-                source.values().iter().map(|x| shortened(*x)).collect()
-            } else {
-                source.values().to_vec()
-            };
+            let values = if short { stored(source.values()) } else { source.values().to_vec() };
             let curve = Curve::new(source.times().to_vec(), values, s.width, source.interpolation());
             return curve.ok().map(|c| made(c, short, Form::Kept));
         }
@@ -380,6 +385,22 @@ impl Job {
         Some(best)
     }
 
+    /// The integer that stands for 1, if integers hold the track's values well enough: a third of what is allowed, or exactly.
+    fn unit(&self, allowed: f64) -> Option<f32> {
+        match self.samples.kind {
+            Kind::Rotation => (SHORT_ERROR < 0.3 * allowed).then_some(32_767.0),
+            Kind::Weights => {
+                let values = self.source.values();
+                let within = |least: f32| values.iter().all(|v| (least..=1.0).contains(v));
+                let units = if within(0.0) { [255.0, 65_535.0] } else { [127.0, 32_767.0] };
+                let exact = self.source.integers().map(|form| form.unit());
+                let fine = |unit: &f32| 0.5 / (*unit as f64) < 0.3 * allowed || exact == Some(*unit);
+                units.into_iter().find(fine).filter(|_| within(-1.0))
+            }
+            _ => None,
+        }
+    }
+
     fn straight(&self, pieces: &fit::Pieces) -> Curve {
         let s = &self.samples;
         let times = pieces.keys.iter().map(|&k| s.times[k]).collect();
@@ -401,9 +422,4 @@ impl Job {
         }
         Curve::new(times, values, width, Interpolation::Hold).expect("keys of a curve, in order")
     }
-}
-
-/// What a normalised 16-bit integer holds of a number in −1…1.
-fn shortened(x: f32) -> f32 {
-    (x * 32767.0).round().clamp(-32767.0, 32767.0) / 32767.0
 }
