@@ -1,8 +1,9 @@
 //! Time along a pane: where a second is, the ruler, zoom and pan, the playhead.
 
 use crate::Bus;
-use crate::state::{Command, Edit, Marker, State, View};
+use crate::state::{Command, Edit, State, View};
 use egui::{Align2, Color32, FontId, PointerButton, Pos2, Rect, Sense, Stroke, Vec2, pos2};
+use sinew::time::Marker;
 
 /// Height of the ruler, points.
 pub const RULER: f32 = 26.0;
@@ -14,7 +15,7 @@ pub const SELECTED: Color32 = Color32::from_rgb(255, 190, 60);
 const SCALES: (f64, f64) = (1e-6, 3600.0);
 
 /// Seconds to points in one pane.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axis {
     /// Where keys are drawn, below the ruler.
     pub rect: Rect,

@@ -81,23 +81,31 @@ struct Block {
 /// What can be seen of `times`, in blocks.
 fn blocks(axis: &Axis, times: &[f64]) -> Vec<Block> {
     let seen = axis.visible(times);
-    let (mut out, mut k) = (Vec::new(), seen.start);
+    let (mut out, mut k, mut many) = (Vec::new(), seen.start, 1);
     while k < seen.end {
-        let end = first_from(times, k + 1, seen.end, times[k] + APART * axis.scale);
+        let end = first_from(times, k + 1..seen.end, times[k] + APART * axis.scale, k + many);
         out.push(Block { keys: k..end, from: axis.x(times[k]), to: axis.x(times[end - 1]) });
-        k = end;
+        (k, many) = (end, end - k);
     }
     out
 }
 
-/// The first key in `from..end` at `limit` or later: by strides that double, since it is near.
-fn first_from(times: &[f64], from: usize, end: usize, limit: f64) -> usize {
-    let (mut low, mut stride) = (from, 1);
-    while low + stride < end && times[low + stride] < limit {
-        low += stride;
+/// The first key of a run at `limit` or later, looked for around a guess by strides that double: as keys are about as far apart as
+/// they were, few are looked at, however many there are.
+fn first_from(times: &[f64], run: Range<usize>, limit: f64, guess: usize) -> usize {
+    let guess = guess.clamp(run.start, run.end);
+    let (mut low, mut high, mut stride) = (guess, guess, 1);
+    while high < run.end && times[high] < limit {
+        low = high + 1;
+        high = (high + stride).min(run.end);
         stride *= 2;
     }
-    low + times[low..end.min(low + stride + 1)].partition_point(|&t| t < limit)
+    while low > run.start && times[low - 1] >= limit {
+        high = low - 1;
+        low = low.saturating_sub(stride).max(run.start);
+        stride *= 2;
+    }
+    low + times[low..high].partition_point(|&t| t < limit)
 }
 
 impl Dope {
@@ -380,6 +388,23 @@ impl Dope {
             say("No keys yet: pose a bone, then press I over the viewport or here");
         } else if self.rows.tracks.is_empty() {
             say("No track matches: clear the filter, or show more than the selected bones");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_key_is_found_from_any_guess() {
+        let times = [0.0, 1.0, 1.0, 2.0, 5.0, 9.0, 9.5];
+        for (from, limit, guess) in
+            (0..7).flat_map(|f| (0..22).flat_map(move |l| (0..9).map(move |g| (f, l, g))))
+        {
+            let limit = f64::from(limit) * 0.5;
+            let want = (from..6).find(|&k| times[k] >= limit).unwrap_or(from.max(6));
+            assert_eq!(first_from(&times, from..from.max(6), limit, guess), want, "{from} {limit} {guess}");
         }
     }
 }

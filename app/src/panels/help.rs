@@ -37,6 +37,7 @@ pub fn gestures(of: Pane) -> &'static [(&'static str, &'static str)] {
             ("Wheel", "zoom at the pointer"),
             ("Shift + wheel, or over the names", "scroll rows"),
             ("Middle drag", "pan"),
+            ("T", "hold, linear or smooth: of whole tracks with a selected key, not of single keys"),
             ("Right click", "all that can be done to keys"),
             ("Esc", "cancel the drag"),
         ],
@@ -47,6 +48,7 @@ pub fn gestures(of: Pane) -> &'static [(&'static str, &'static str)] {
             ("Wheel", "zoom time at the pointer"),
             ("Shift + wheel, or over the numbers", "zoom values"),
             ("Middle drag", "pan; “fit” lets values fit again"),
+            ("T", "hold, linear or smooth: of whole tracks with a selected key, not of single keys"),
             ("Esc", "cancel the drag"),
         ],
     }

@@ -11,7 +11,7 @@ use super::parts::{Names, menu};
 use crate::Bus;
 use crate::commands::Task;
 use crate::state::{Command, Keys, Mode, Spans, State, TrackKeys};
-use channel::{Channel, Values, channels, extent, nearest};
+use channel::{Channel, Looks, Values, channels, nearest};
 use draw::{curve, legend, levels, tangent};
 use egui::{Align2, Color32, FontId, PointerButton, Pos2, Rect, Sense, Vec2, pos2};
 
@@ -25,6 +25,7 @@ pub struct Graph {
     last_fit: Option<(f64, f64)>,
     grip: Grip,
     last_time: f64,
+    looks: Looks,
     /// What a command asked for, to be done when the pane is drawn next.
     pub pending: Option<Task>,
 }
@@ -35,8 +36,8 @@ impl Graph {
         let pane = ui.max_rect();
         let rect = Rect::from_min_max(pane.min + Vec2::new(LABELS, RULER), pane.max);
         let axis = Axis::new(&state.view, rect);
-        let channels = channels(state, &axis);
-        let (low, high) = self.range(&channels, &axis);
+        let channels = channels(state, &axis, &mut self.looks);
+        let (low, high) = self.range(&channels);
         let values = Values { rect, low, high };
 
         let sense = ui.interact(pane, ui.scope_id().with("graph"), Sense::click_and_drag());
@@ -57,7 +58,7 @@ impl Graph {
     }
 
     /// Bottom and top: what somebody chose, or what is there; while keys are dragged it stays.
-    fn range(&mut self, channels: &[Channel<'_>], axis: &Axis) -> (f64, f64) {
+    fn range(&mut self, channels: &[Channel<'_>]) -> (f64, f64) {
         if let Some(held) = self.held {
             return held;
         }
@@ -66,7 +67,7 @@ impl Graph {
         }
         let mut ends: Option<(f64, f64)> = None;
         for c in channels {
-            let (a, b) = extent(c, axis);
+            let (a, b) = c.extent();
             ends = Some(ends.map_or((a, b), |(lo, hi)| (lo.min(a), hi.max(b))));
         }
         let (lo, hi) = ends.unwrap_or((-1.0, 1.0));
