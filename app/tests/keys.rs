@@ -64,6 +64,34 @@ fn clicks_choose_keys() {
     assert!(p.state().undo_name() == Some("Pose"), "choosing is no step of undo");
 }
 
+/// What a touchpad sends: the button is down and up before the next frame.
+#[test]
+fn taps_choose_keys_and_move_the_playhead() {
+    let mut p = posed();
+    let tap = |p: &mut Person, pos: egui::Pos2| {
+        p.hover(pos);
+        for pressed in [true, false] {
+            let (button, modifiers) = (PointerButton::Primary, NONE);
+            p.ui.event(Event::PointerButton { pos, button, pressed, modifiers });
+        }
+        p.ui.run_steps(3);
+    };
+    let at = p.place("shin.L.θ key 10").center();
+    tap(&mut p, at);
+    assert!(selected(&p) == 1 && !p.state().in_gesture());
+    p.hover(at + vec2(30.0, 0.0));
+    assert_eq!(p.times("shin.L"), [0.0, 10.0, 20.0], "nothing is held");
+    let ruler = p.place("Dope sheet ruler");
+    tap(&mut p, egui::pos2(at.x, ruler.bottom() - 3.0));
+    assert_eq!(p.state().frame_at(p.state().time), 10.0);
+    tap(&mut p, at + vec2(0.0, 80.0));
+    assert_eq!(selected(&p), 0);
+    p.pick("shin.L");
+    let curve = p.place("shin.L.θ2 key 10").center();
+    tap(&mut p, curve);
+    assert!(selected(&p) == 1 && !p.state().in_gesture());
+}
+
 #[test]
 fn keys_go_come_twice_and_come_back() {
     let mut p = posed();

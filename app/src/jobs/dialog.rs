@@ -52,7 +52,7 @@ const RAYS: u32 = 16;
 
 /// Kinds of export: name, what stands behind the file's stem, and help.
 const KINDS: [(&str, &str, &str); 5] = [
-    ("GLB", ".glb", "The character with its clips, for other programs"),
+    ("GLB", "-edited.glb", "The character with its clips, for other programs"),
     ("GIF", ".gif", "The clip as a film; .webp, .apng and .y4m work as well"),
     ("frames", ".####.png", "A picture a frame"),
     ("sheet", ".sheet.png", "All frames in one picture, and a table of them"),
@@ -75,9 +75,8 @@ impl Ask {
     pub fn export(source: Option<&Source>, state: &State, still: bool) -> Self {
         let stem = source.map_or("clip".into(), |s| s.path.with_extension("").display().to_string());
         let (kind, ending, _) = KINDS[if still { 4 } else { 0 }];
-        let tail = if kind == "GLB" { "-edited" } else { "" };
         Self::Export(Export {
-            path: format!("{stem}{tail}{ending}"),
+            path: format!("{stem}{ending}"),
             kind,
             size: [512, 512],
             as_shown: still,
@@ -117,6 +116,9 @@ fn path_line(ui: &mut egui::Ui, path: &mut String) -> Answer {
         let edit = ui.add(TextEdit::singleline(path).desired_width(420.0)).labelled_by(named);
         if edit.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) {
             answer = Answer::Do;
+        } else if ui.memory(|m| m.focused().is_none()) {
+            // Whoever types means the path.
+            edit.request_focus();
         }
         if ui.button("Browse…").on_hover_text("The system's own dialog").clicked() {
             answer = Answer::Browse;
@@ -337,7 +339,8 @@ fn number<N: egui::emath::Numeric>(
     unit: &str,
 ) {
     let label = ui.label(name).id;
-    ui.add(egui::DragValue::new(of).range(range).suffix(unit).max_decimals(3)).labelled_by(label);
+    let decimals = if N::INTEGRAL { 0 } else { 3 };
+    ui.add(egui::DragValue::new(of).range(range).suffix(unit).max_decimals(decimals)).labelled_by(label);
 }
 
 impl Jobs {

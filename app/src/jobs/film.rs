@@ -97,7 +97,9 @@ pub fn write(
     } else {
         job.stills()?;
     }
-    Ok(format!("{count} frames → {}", job.target.name().display()))
+    let from = if sides > 1 { format!(" from {sides} sides") } else { String::new() };
+    let frames = if single { "1 picture".into() } else { format!("{count} frames") };
+    Ok(format!("{frames}{from} → {}", job.target.name().display()))
 }
 
 fn threads() -> usize {

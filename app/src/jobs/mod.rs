@@ -319,7 +319,8 @@ impl Jobs {
             }
             Outcome::Failed(why) => {
                 self.after_save = None;
-                bus.tell(format!("{name}: {why}"));
+                let file = name.split_once(' ').map_or("", |n| n.1);
+                bus.tell(if why.contains(file) { why } else { format!("{name}: {why}") });
             }
             Outcome::Cancelled => bus.tell(format!("{name}: cancelled")),
         }

@@ -114,9 +114,8 @@ pub fn ruler(ui: &mut egui::Ui, axis: &Axis, name: &str, state: &State, bus: &mu
     let response = ui.interact(rect, ui.scope_id().with("ruler"), Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Slider, true, name));
     let held = response.is_pointer_button_down_on() && ui.input(|i| i.pointer.primary_down());
-    if let (true, Some(at)) =
-        (held || response.dragged_by(PointerButton::Primary), response.interact_pointer_pos())
-    {
+    let taken = held || response.dragged_by(PointerButton::Primary) || response.clicked();
+    if let (true, Some(at)) = (taken, response.interact_pointer_pos()) {
         // Beyond an edge the pane runs along, so the playhead stays in view.
         let x = at.x.clamp(rect.left(), rect.right());
         let over = at.x - x;

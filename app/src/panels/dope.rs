@@ -193,9 +193,15 @@ impl Dope {
         let shift = ui.input(|i| i.modifiers.shift || i.modifiers.command);
         let mode = if shift { Mode::Toggle } else { Mode::Replace };
         let pressed = ui.input(|i| i.pointer.button_pressed(PointerButton::Primary));
-        if pressed && sense.is_pointer_button_down_on() && at.x >= axis.rect.left() && at.y >= axis.rect.top()
-        {
+        // A tap is pressed and released within one frame.
+        let tapped = pressed && sense.clicked();
+        let down = pressed && sense.is_pointer_button_down_on();
+        if (down || tapped) && at.x >= axis.rect.left() && at.y >= axis.rect.top() {
             let (hit, selected) = self.hit(axis, body, at, state);
+            if tapped {
+                bus.send(Command::SelectKeys(hit, mode));
+                return;
+            }
             if hit.is_empty() {
                 self.grip.drag = Drag::Box { from: (here.0, f64::from(at.y - body.top() + self.scroll)) };
                 return;
@@ -336,7 +342,10 @@ impl Dope {
             let name = track_name(skeleton, of);
             let clip =
                 rows.with_clip_rect(line.with_max_x(axis.rect.left() - 2.0).intersect(rows.clip_rect()));
-            clip.text(pos2(left, y), Align2::LEFT_CENTER, &name, font.clone(), text);
+            // Of a name that is too long the end is seen: it says which channel it is.
+            let galley = clip.layout_no_wrap(name.clone(), font.clone(), text);
+            let x = left.min(axis.rect.left() - 6.0 - galley.size().x);
+            clip.galley(pos2(x, y - galley.size().y / 2.0), galley, text);
             self.row(&mut drawn, axis, y, track, &name, state, &mut names, body);
         }
         keys.add(mesh);

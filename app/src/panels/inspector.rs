@@ -43,12 +43,16 @@ fn asset(ui: &mut egui::Ui, state: &State) {
     let vertices: usize = c.instances().iter().map(|i| c.mesh(i).positions.len()).sum();
     ui.separator();
     let lines = [
-        format!("{} bones", c.skeleton().len()),
-        format!("{} meshes, {vertices} vertices", c.meshes().len()),
-        format!("{} clips", state.document.clips.len()),
-        format!("{} tracks in this clip", state.active().tracks.len()),
+        many(c.skeleton().len(), "bone", "bones"),
+        format!("{}, {vertices} vertices", many(c.meshes().len(), "mesh", "meshes")),
+        many(state.document.clips.len(), "clip", "clips"),
+        format!("{} in this clip", many(state.active().tracks.len(), "track", "tracks")),
     ];
     lines.into_iter().for_each(|l| drop(ui.label(l)));
+}
+
+fn many(n: usize, one: &str, more: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { more })
 }
 
 /// Weights of blend shapes, by the meshes that they change.

@@ -300,7 +300,7 @@ impl Viewport {
             Some(Drag::Hold(_, part)) => Some(*part),
             _ => None,
         };
-        if let Some(g) = self.gizmo(state, &lens) {
+        if let Some(g) = self.gizmo(state, &lens).filter(|_| state.playback.playing.is_none()) {
             overlay::gizmo(&painter, &lens, &g, held);
             self.name_handles(ui, state, &lens, &g);
         }

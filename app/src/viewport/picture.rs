@@ -171,13 +171,15 @@ impl Picture {
             return None;
         }
         self.of = Some(now);
-        self.drawn += 1;
         let shrink = if quality == Quality::Draft { 2 } else { 1 };
         let [width, height] = size.map(|s| s.div_ceil(shrink).min(Settings::MAX_SIZE));
         let samples = if moving || quality == Quality::Draft { 1 } else { 4 };
         let threads = std::thread::available_parallelism().map_or(1, |n| n.get().min(8));
         let settings = Settings { width, height, samples, threads };
-        self.draw(ctx, state, orbit, &settings)
+        let cost = self.draw(ctx, state, orbit, &settings)?;
+        let drew = cost.draw_ms > 0.0;
+        self.drawn += u64::from(drew);
+        drew.then_some(cost)
     }
 
     fn draw(

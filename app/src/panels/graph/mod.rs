@@ -142,10 +142,17 @@ impl Graph {
         }
         let shift = ui.input(|i| i.modifiers.shift || i.modifiers.command);
         let pressed = ui.input(|i| i.pointer.button_pressed(PointerButton::Primary));
-        if !(pressed && sense.is_pointer_button_down_on() && axis.rect.contains(at)) {
+        // A tap is pressed and released within one frame.
+        let tapped = pressed && sense.clicked();
+        let down = pressed && sense.is_pointer_button_down_on();
+        if !((down || tapped) && axis.rect.contains(at)) {
             return;
         }
+        let mode = if shift { Mode::Add } else { Mode::Replace };
         let Some((channel, k)) = nearest(channels, axis, values, at) else {
+            if tapped {
+                return bus.send(Command::SelectKeys(Keys::new(), mode));
+            }
             self.grip.drag = Drag::Box { from: here };
             return;
         };
@@ -156,8 +163,11 @@ impl Graph {
         let chosen = state.selection.keys.get(&(channel.track as u32));
         let selected = chosen.is_some_and(|s| s.spans.contains(k) && s.mask & channel.bit() != 0);
         let click = Some(keys.clone()).filter(|_| selected && !shift);
-        if click.is_none() {
-            bus.send(Command::SelectKeys(keys, if shift { Mode::Add } else { Mode::Replace }));
+        if tapped || click.is_none() {
+            bus.send(Command::SelectKeys(keys, mode));
+        }
+        if tapped {
+            return;
         }
         self.grip.take(here, channel.stored_unit(), bus);
         self.grip.click = click;
@@ -239,7 +249,10 @@ impl Graph {
         } else if let Some(hint) = singular(state) {
             inner.text(below, Align2::RIGHT_BOTTOM, hint, font, Color32::from_rgb(240, 200, 120));
         } else if channels.is_empty() {
-            let text = "Select bones, or keys in the dope sheet, to see their curves";
+            let text = match state.selection.bones.is_empty() {
+                true => "Select bones, or keys in the dope sheet, to see their curves",
+                false => "The selected bones have no keys yet: I sets some",
+            };
             inner.text(axis.rect.center(), Align2::CENTER_CENTER, text, font, ui.visuals().weak_text_color());
         }
     }
