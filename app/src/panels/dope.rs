@@ -306,7 +306,7 @@ impl Dope {
         let keys = painter.with_clip_rect(axis.rect);
         axis::grid(&keys, axis, state, ui.visuals());
         let mut mesh = egui::Mesh::default();
-        let mut names = Names(ui);
+        let mut names = Names::of(ui, "dope");
 
         // The summary, then the rows.
         let mid = axis.rect.top() + ROW / 2.0;

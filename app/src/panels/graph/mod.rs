@@ -216,7 +216,7 @@ impl Graph {
         axis::grid(&inner, axis, state, ui.visuals());
         levels(&painter, values, ui.visuals());
         let mut mesh = egui::Mesh::default();
-        let mut names = Names(ui);
+        let mut names = Names::of(ui, "graph");
         // Slopes of many keys would hide the curves.
         let few = state.selection.key_count() <= 24;
         for c in channels {
@@ -226,7 +226,7 @@ impl Graph {
 
             // Keys too close to be taken one by one are left to the curve.
             let crowded = seen.len() as f32 > axis.rect.width() / 4.0;
-            for k in seen.filter(|_| !crowded) {
+            for k in if crowded { 0..0 } else { seen } {
                 let (t, v) = c.key(k);
                 let at = pos2(axis.x(t), values.y(v));
                 let on = chosen.is_some_and(|s| s.spans.contains(k));
