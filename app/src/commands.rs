@@ -247,6 +247,26 @@ pub fn named(name: &str) -> &'static Action {
     ACTIONS.iter().find(|a| a.name == name).unwrap_or_else(|| panic!("no action is called `{name}`"))
 }
 
+/// Whether what an action switches is on now.
+pub fn is_on(action: &Action, s: &State) -> bool {
+    match action.name {
+        "Automatic keys" => s.auto_key,
+        "Snap to frames" => s.snap,
+        "Loop" => s.playback.mode == LoopMode::Loop,
+        "Once" => s.playback.mode == LoopMode::Once,
+        "Ping-pong" => s.playback.mode == LoopMode::PingPong,
+        "Every frame" => s.playback.every_frame,
+        "Only selected bones" => s.view.only_selected,
+        "Normalise curves" => s.view.normalise,
+        "Onion skin" => s.view.onion,
+        "Motion paths" => s.view.paths,
+        "Draft quality" => s.view.quality == Quality::Draft,
+        "Normal quality" => s.view.quality == Quality::Normal,
+        "Exact quality" => s.view.quality == Quality::Exact,
+        _ => false,
+    }
+}
+
 fn next_style(of: BoneStyle) -> BoneStyle {
     match of {
         BoneStyle::Hidden => BoneStyle::Sticks,

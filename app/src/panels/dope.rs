@@ -31,7 +31,8 @@ pub struct Dope {
     grip: Grip,
     last_time: f64,
     width: f32,
-    shown: Option<Arc<sinew::asset::Asset>>,
+    /// What time was framed for: another file or clip is looked at as a whole.
+    shown: Option<(Arc<sinew::asset::Asset>, usize)>,
     /// What a command asked for, to be done when the pane is drawn next.
     pub pending: Option<Task>,
 }
@@ -117,8 +118,9 @@ impl Dope {
         let keys = Rect::from_min_max(pane.min + Vec2::new(NAMES, RULER), pane.max);
         let axis = Axis::new(&state.view, keys);
         self.width = keys.width();
-        if !self.shown.as_ref().is_some_and(|a| Arc::ptr_eq(a, &state.document.asset)) {
-            self.shown = Some(state.document.asset.clone());
+        let same = |(a, c): &(Arc<_>, usize)| Arc::ptr_eq(a, &state.document.asset) && *c == state.clip;
+        if !self.shown.as_ref().is_some_and(same) {
+            self.shown = Some((state.document.asset.clone(), state.clip));
             let range = state.active().range;
             self.frame(range.start, range.end, state, bus);
         }

@@ -238,8 +238,8 @@ fn tracks(ui: &mut egui::Ui, bone: BoneId, state: &State, bus: &mut Bus) {
         let here = track.curve.key_at(state.time).is_some();
         let key = if here { "◆" } else { "◇" };
         let text = format!(
-            "{key} {channel}: {} keys, {}",
-            track.curve.times().len(),
+            "{key} {channel}: {}, {}",
+            many(track.curve.times().len(), "key", "keys"),
             interpolation_name(track.curve.interpolation())
         );
         ui.label(text).on_hover_text("◆ there is a key at the playhead · the interpolation is per track");
