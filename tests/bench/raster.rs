@@ -85,7 +85,11 @@ fn main() {
                     })
                     .collect();
                 times.sort_by(f64::total_cmp);
-                println!("{n:9}  {width:4}×{height:<4}  {samples:7}  {:6.2}  {:8.2}", times[rounds / 2], times[0]);
+                println!(
+                    "{n:9}  {width:4}×{height:<4}  {samples:7}  {:6.2}  {:8.2}",
+                    times[rounds / 2],
+                    times[0]
+                );
             }
         }
     }

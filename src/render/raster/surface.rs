@@ -2,6 +2,7 @@
 
 use super::frame::{Class, Draw, Frame, Projector};
 use super::resolve;
+use super::scan::Key;
 use crate::math::simd::{self, F8, I8, Kernel, V8};
 use crate::render::material::{self, Points};
 use crate::render::sample::Uv;
@@ -104,7 +105,7 @@ pub(super) struct Shade<'a, const ONE: bool> {
     /// Its corners, by [`corners_of`], if it is one triangle.
     pub known: &'a [Vec4; 3],
     /// Where in the tile.
-    pub keys: &'a [I8],
+    pub keys: &'a [[Key; 8]],
     /// The tile's first pixel, from the picture's centre.
     pub corner: [f32; 2],
     /// Linear light, premultiplied, and alpha.
@@ -127,7 +128,7 @@ impl<const ONE: bool> Kernel for Shade<'_, ONE> {
     fn run(self) {
         let Self { frame, draw, ids, known, keys, corner, out } = self;
         for (i, (keys, out)) in keys.iter().zip(out).enumerate() {
-            let [px, py] = resolve::points(corner, keys);
+            let [px, py] = resolve::points(corner, &I8(*keys));
             let seen = seen::<ONE>(frame, draw, &ids[if ONE { 0 } else { i }], known, px, py);
             let (c, alpha) = material::light(frame.isa, frame.scene, draw.material, &seen);
             *out = match draw.class {
