@@ -6,7 +6,7 @@ use super::colors::{Colors, Sink};
 use super::frame::{Draw, Frame, ROTATED};
 use super::merge::share_a_vertex;
 use super::scan::{self, Key, WHOLE, covers, key};
-use super::surface::{self, Shade};
+use super::surface::{self, Corners, Shade};
 use super::tile::TileScratch;
 use super::{Stats, TILE};
 use crate::math::simd::{F8, I8};
@@ -86,7 +86,8 @@ fn chain(frame: &Frame, area: Area, k: usize, scratch: &mut TileScratch) {
                 keys[k] = keys[0];
             }
             let (keys, out) = (keys.as_chunks::<8>().0, &mut shades.0[..count]);
-            Shade::<true> { frame, draw, ids: &ids, known: &known, keys, corner, out }.colors();
+            let (ids, known, found) = (&ids, &known, &mut []);
+            Shade::<true> { frame, draw, ids, known, found, keys, corner, out }.colors();
             for i in 0..count {
                 colors.put(&I8(keys[i]), (n as usize - 8 * i).min(8), &shades.0[i]);
             }
@@ -174,6 +175,7 @@ fn loose(frame: &Frame, area: Area, scratch: &mut TileScratch) {
 struct Waiting {
     keys: [[Key; 8]; BATCHES],
     ids: [[u32; 8]; BATCHES],
+    found: [Corners; BATCHES],
     rgba: [[F8; 4]; BATCHES],
     n: usize,
 }
@@ -181,7 +183,8 @@ struct Waiting {
 impl Waiting {
     #[inline(always)]
     fn new() -> Self {
-        Self { keys: [[0; 8]; BATCHES], ids: [[0; 8]; BATCHES], rgba: [[F8::ZERO; 4]; BATCHES], n: 0 }
+        let (found, rgba) = ([Corners::NONE; BATCHES], [[F8::ZERO; 4]; BATCHES]);
+        Self { keys: [[0; 8]; BATCHES], ids: [[0; 8]; BATCHES], found, rgba, n: 0 }
     }
 
     #[inline(always)]
@@ -225,8 +228,8 @@ impl Waiting {
             }
         }
         let (keys, ids, out) = (&self.keys[..batches], &self.ids[..batches], &mut self.rgba[..batches]);
-        let (known, corner) = (&[Vec4::ZERO; 3], area.corner(frame));
-        Shade::<false> { frame, draw, ids, known, keys, corner, out }.colors();
+        let (known, corner, found) = (&[Vec4::ZERO; 3], area.corner(frame), &mut self.found[..batches]);
+        Shade::<false> { frame, draw, ids, known, found, keys, corner, out }.colors();
         batches
     }
 }
