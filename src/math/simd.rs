@@ -411,7 +411,7 @@ pub enum Isa {
 #[inline]
 pub fn run<K: Kernel>(isa: Isa, kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
-    if isa == Isa::Best && has_avx2() {
+    if isa == Isa::Best && *HAS_AVX2 {
         // What calling it needs has just been checked.
         #[allow(unsafe_code)]
         return unsafe { run_avx2(kernel) };
@@ -422,14 +422,13 @@ pub fn run<K: Kernel>(isa: Isa, kernel: K) -> K::Output {
 
 /// Whether there is what [`run_avx2`] uses: AVX2, and what counts bits, which came to processors before it.
 #[cfg(target_arch = "x86_64")]
-#[inline]
-fn has_avx2() -> bool {
+static HAS_AVX2: std::sync::LazyLock<bool> = std::sync::LazyLock::new(|| {
     is_x86_feature_detected!("avx2")
         && is_x86_feature_detected!("bmi1")
         && is_x86_feature_detected!("bmi2")
         && is_x86_feature_detected!("lzcnt")
         && is_x86_feature_detected!("popcnt")
-}
+});
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]

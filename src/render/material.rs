@@ -64,16 +64,16 @@ impl<'a, const ANY: bool> Maps<'a, ANY> {
     #[inline(never)]
     fn look_up(&self, map: &TextureRef) -> Option<[F8; 4]> {
         let texture = self.scene.textures.get(map.texture.0 as usize)?;
-        let uv = transformed(self.uv[(map.uv_set & 1) as usize], &map.transform);
-        Some(sample::sample(self.isa, texture, &uv))
+        let uv = &self.uv[(map.uv_set & 1) as usize];
+        if map.transform == Affine2::IDENTITY {
+            return Some(sample::sample(self.isa, texture, uv));
+        }
+        Some(sample::sample(self.isa, texture, &transformed(uv, &map.transform)))
     }
 }
 
 #[inline(always)]
-fn transformed(uv: Uv, by: &Affine2) -> Uv {
-    if *by == Affine2::IDENTITY {
-        return uv;
-    }
+fn transformed(uv: &Uv, by: &Affine2) -> Uv {
     let (x, y, t) = (by.matrix2.x_axis, by.matrix2.y_axis, by.translation);
     let turn = |a: F8, b: F8| [a * x.x + b * y.x, a * x.y + b * y.y];
     let [u, v] = turn(uv.u, uv.v);
