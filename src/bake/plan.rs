@@ -20,6 +20,14 @@ const AIM: f64 = 0.97;
 /// And where they leave out keys.
 const SPARSE_AIM: f64 = 0.94;
 
+/// Less than this part of the aim is not used up.
+const UNUSED: f64 = 0.85;
+
+/// How often shares are raised then, by what, and how many tracks may be given less each time.
+const RAISES: usize = 16;
+const RAISE: f64 = 1.3;
+const BLAMED: usize = 8;
+
 /// Largest error of a normalised 16-bit quaternion, radians, and of its interpolation.
 const SHORT_ERROR: f64 = 7e-5;
 
@@ -60,6 +68,13 @@ enum Form {
     Rule,
     /// Cubics with slopes of their own.
     Slopes,
+}
+
+/// Shares, and what was made with them.
+struct State {
+    share: f64,
+    /// Of each track, its weight.
+    tracks: Vec<(f64, Option<Made>)>,
 }
 
 /// How much is tried for a track.
@@ -124,13 +139,16 @@ impl<'a> Plan<'a> {
         let aim = if self.sparse { SPARSE_AIM } else { AIM };
         let looks = gauge.looks(self.clip, &self.moments);
         self.narrow(gauge, &looks, aim, true);
-        self.narrow(gauge, &looks, aim, false);
+        let error = self.narrow(gauge, &looks, aim, false);
+        if error < UNUSED * aim {
+            self.relieve(gauge, &looks, aim);
+        }
         self.widen(gauge, &looks, aim);
         self.finish()
     }
 
-    /// Bring the share close to the largest that keeps `aim`.
-    fn narrow(&mut self, gauge: &Gauge, looks: &Looks, aim: f64, draft: bool) {
+    /// Bring the share close to the largest that keeps `aim`, and return the error that is left with it.
+    fn narrow(&mut self, gauge: &Gauge, looks: &Looks, aim: f64, draft: bool) -> f64 {
         // Drafts only show the neighbourhood.
         let (rounds, close) = if draft { (14, 0.85) } else { (6, 0.95) };
         let (mut low, mut high) = (0.0, f64::INFINITY);
@@ -142,10 +160,10 @@ impl<'a> Plan<'a> {
                 (false, _) => Effort::Again,
             };
             self.make_all(gauge, effort);
-            let error = gauge.most(looks, &self.assemble());
+            let (error, _) = gauge.most(looks, &self.assemble());
             if error <= aim {
                 low = self.share;
-                best = Some((low, self.jobs.iter().map(|j| j.made.clone()).collect::<Vec<_>>()));
+                best = Some((error, self.state()));
             } else {
                 high = self.share;
             }
@@ -162,10 +180,68 @@ impl<'a> Plan<'a> {
                 0.5 * self.share
             };
         }
-        if let Some((share, made)) = best {
-            self.share = share;
-            self.jobs.iter_mut().zip(made).for_each(|(job, made)| job.made = made);
+        let Some((error, state)) = best else { return f64::INFINITY };
+        self.restore(state);
+        error
+    }
+
+    /// Raise the share where a few tracks are what keeps it low: those get less.
+    fn relieve(&mut self, gauge: &Gauge, looks: &Looks, aim: f64) {
+        let much = |plan: &Self| match (plan.desc.goal, plan.finish().report) {
+            (Goal::Keys, report) => report.keys[1],
+            (Goal::Bytes, report) => report.bytes[1],
+        };
+        for _ in 0..RAISES {
+            let (before, was) = (self.state(), much(self));
+            self.share *= RAISE;
+            self.make_all(gauge, Effort::Again);
+            let mut blamed = 0;
+            let error = loop {
+                let clip = self.assemble();
+                let (error, moment) = gauge.most(looks, &clip);
+                if error <= aim || blamed == BLAMED {
+                    break error;
+                }
+                blamed += 1;
+                let i = self.to_blame(gauge, looks, moment, &clip);
+                self.jobs[i].weight /= RAISE * RAISE;
+                self.jobs[i].made = self.made(i, Effort::Again);
+            };
+            if error > aim || much(self) > was {
+                return self.restore(before);
+            }
         }
+    }
+
+    /// The track without whose error a moment would be least off.
+    fn to_blame(&self, gauge: &Gauge, looks: &Looks, moment: usize, clip: &Clip) -> usize {
+        let (shown, time) = looks.at(moment);
+        let made = gauge.pose(clip, time);
+        let all: Vec<usize> = (0..self.jobs.len()).collect();
+        let left = gauge.map(&all, |i| {
+            let mut pose = made.clone();
+            let local = |b: crate::skeleton::BoneId| &shown.locals[b.index()];
+            match self.jobs[i].target {
+                Target::Rotation(b) | Target::Xzx(b) => pose.locals[b.index()].rotation = local(b).rotation,
+                Target::Translation(b) => pose.locals[b.index()].translation = local(b).translation,
+                Target::Scale(b) => pose.locals[b.index()].scale = local(b).scale,
+                Target::Weights { first } => {
+                    let run = first..first + self.jobs[i].source.width();
+                    pose.weights[run.clone()].copy_from_slice(&shown.weights[run]);
+                }
+            }
+            gauge.between(shown, &pose).share()
+        });
+        (0..left.len()).min_by(|a, b| left[*a].total_cmp(&left[*b])).unwrap_or(0)
+    }
+
+    fn state(&self) -> State {
+        State { share: self.share, tracks: self.jobs.iter().map(|j| (j.weight, j.made.clone())).collect() }
+    }
+
+    fn restore(&mut self, state: State) {
+        self.share = state.share;
+        self.jobs.iter_mut().zip(state.tracks).for_each(|(job, kept)| (job.weight, job.made) = kept);
     }
 
     /// The same with more moments.

@@ -14,7 +14,7 @@ use crate::skeleton::BoneId;
 use blocks::{Far, Skin};
 use glam::{Affine3A, Vec3};
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, OnceLock};
 
 /// Which points of a character must not stray.
@@ -103,6 +103,13 @@ pub type Watch<'a> = &'a (dyn Fn(Stage, usize) + Sync);
 pub struct Looks {
     times: Vec<f64>,
     shown: Vec<Shown>,
+}
+
+impl Looks {
+    /// What the clip shows at the `i`-th moment, and when that is.
+    pub(super) fn at(&self, i: usize) -> (&Pose, f64) {
+        (&self.shown[i].pose, self.times[i])
+    }
 }
 
 /// Evaluates clips of one character.
@@ -224,18 +231,21 @@ impl<'a> Gauge<'a> {
         Looks { times: times.to_vec(), shown: parts.concat() }
     }
 
-    /// How far a clip strays at most at any of these moments, as a part of what is allowed.
-    pub fn most(&self, looks: &Looks, clip: &Clip) -> f64 {
-        // What one thread found rules vertices out for all; shares are not negative, so that their bits are in order.
-        let top = AtomicU64::new(0);
+    /// How far a clip strays at most at any of these moments, as a part of what is allowed, and the first at which it does.
+    pub fn most(&self, looks: &Looks, clip: &Clip) -> (f64, usize) {
+        // What one thread found rules vertices out for all, but for those that stray as far.
+        let top = Mutex::new((0.0_f64, 0));
+        let known = || *top.lock().expect("no thread panics");
         self.chunks(looks.times.len(), |bench, range| {
             for i in range {
-                let floor = f64::from_bits(top.load(Ordering::Relaxed));
-                let found = self.at(clip, looks.times[i], bench, Some(&looks.shown[i]), floor);
-                top.fetch_max(found.share().to_bits(), Ordering::Relaxed);
+                let found = self.at(clip, looks.times[i], bench, Some(&looks.shown[i]), known().0).share();
+                let mut top = top.lock().expect("no thread panics");
+                if found > top.0 || (found == top.0 && i < top.1) {
+                    *top = (found, i);
+                }
             }
         });
-        f64::from_bits(top.into_inner())
+        known()
     }
 
     /// Whether a clip strays by more than `share` of what is allowed at any of these moments.
