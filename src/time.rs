@@ -5,10 +5,12 @@
 mod frame_set;
 mod rate;
 mod shard;
+mod timeline;
 
 pub use frame_set::{FrameSet, FrameSetError, frame_time};
 pub use rate::{Rate, RateError};
 pub use shard::{Shard, ShardError};
+pub use timeline::{ClipTimeline, Marker, Timeline};
 
 /// A closed interval of seconds.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]

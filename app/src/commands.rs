@@ -1,12 +1,12 @@
 //! Every action, named once: menus, shortcuts, the palette, context menus and tests take it from here.
 
 use crate::state::{
-    BoneStyle, Command, Edit, LoopMode, Marker, Mirror, Mode, Playback, Quality, Spans, State, TrackKeys,
-    View,
+    BoneStyle, Command, Edit, LoopMode, Mirror, Mode, Playback, Quality, Spans, State, TrackKeys, View,
 };
 use egui::{Key, KeyboardShortcut, Modifiers};
 use sinew::clip::Interpolation;
 use sinew::math::spline::Tangents;
+use sinew::time::Marker;
 
 /// What the window does, not the document.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -185,7 +185,7 @@ pub static ACTIONS: &[Action] = &[
     act("Keys", "Catmull-Rom", "Smooth through the keys, by the notes' slopes (per track)", None, Time, always, Do(|_| interpolate(Interpolation::CatmullRom(Tangents::Notes)))),
     act("Keys", "Catmull-Rom, three points", "Smooth, by the parabola through three keys (per track)", None, Time, always, Do(|_| interpolate(Interpolation::CatmullRom(Tangents::ThreePoint)))),
     act("Keys", "Catmull-Rom, monotone", "Smooth and never beyond the keys (per track)", None, Time, always, Do(|_| interpolate(Interpolation::CatmullRom(Tangents::Monotone)))),
-    act("Keys", "Interpolation…", "Hold, linear or Catmull-Rom by one of three rules, for the tracks of the selected keys", key(Key::T), Any, always, Window(Task::Interpolation)),
+    act("Keys", "Interpolation…", "Hold, linear or Catmull-Rom by one of three rules, for whole tracks with a selected key", key(Key::T), Any, always, Window(Task::Interpolation)),
     act("Keys", "Automatic keys", "A changed pose becomes keys at once", key(Key::K), Any, always, Do(|s| vec![Command::SetAutoKey(!s.auto_key)])),
     act("Keys", "Snap to frames", "Moved and inserted keys stand on whole frames", None, Any, always, Do(|s| vec![Command::SetSnap(!s.snap)])),
     act("Pose", "Reset rotations", "The selected bones as they are at rest", with(ALT, Key::R), Any, always, Do(|_| edit(Edit::ResetRotations))),
@@ -218,8 +218,8 @@ pub static ACTIONS: &[Action] = &[
     act("View", "Motion paths", "Where the selected bones go, keys in bold", key(Key::P), Any, always, Do(|s| view(s, |v| v.paths = !v.paths))),
     act("View", "Next bone style", "Hidden, sticks, pyramids, x-ray", key(Key::B), Any, always, Do(|s| view(s, |v| v.bones = next_style(v.bones)))),
     act("View", "Draft quality", "Half the pixels each way", None, Any, always, Do(|s| view(s, |v| v.quality = Quality::Draft))),
-    act("View", "Normal quality", "Every pixel", None, Any, always, Do(|s| view(s, |v| v.quality = Quality::Normal))),
-    act("View", "Exact quality", "As an export draws it", None, Any, always, Do(|s| view(s, |v| v.quality = Quality::Exact))),
+    act("View", "Normal quality", "Every pixel; smooth edges at rest", None, Any, always, Do(|s| view(s, |v| v.quality = Quality::Normal))),
+    act("View", "Exact quality", "Four samples a pixel, moving or not", None, Any, always, Do(|s| view(s, |v| v.quality = Quality::Exact))),
     act("View", "Reset layout", "Panes where they were at first", None, Any, always, Window(Task::ResetLayout)),
     act("Clip", "New clip", "An empty clip", None, Any, always, Do(|s| edit(Edit::NewClip(format!("clip {}", s.document.clips.len() + 1))))),
     act("Clip", "Mirror clip", "Left does what right did, by bone names", None, Any, |s| !s.active().tracks.is_empty(), Do(|_| edit(Edit::MirrorClip))),
@@ -245,6 +245,26 @@ pub static MENUS: &[&str] = &["File", "Edit", "Keys", "Pose", "Time", "View", "C
 /// If there is none: names are written once, here.
 pub fn named(name: &str) -> &'static Action {
     ACTIONS.iter().find(|a| a.name == name).unwrap_or_else(|| panic!("no action is called `{name}`"))
+}
+
+/// Whether what an action switches is on now.
+pub fn is_on(action: &Action, s: &State) -> bool {
+    match action.name {
+        "Automatic keys" => s.auto_key,
+        "Snap to frames" => s.snap,
+        "Loop" => s.playback.mode == LoopMode::Loop,
+        "Once" => s.playback.mode == LoopMode::Once,
+        "Ping-pong" => s.playback.mode == LoopMode::PingPong,
+        "Every frame" => s.playback.every_frame,
+        "Only selected bones" => s.view.only_selected,
+        "Normalise curves" => s.view.normalise,
+        "Onion skin" => s.view.onion,
+        "Motion paths" => s.view.paths,
+        "Draft quality" => s.view.quality == Quality::Draft,
+        "Normal quality" => s.view.quality == Quality::Normal,
+        "Exact quality" => s.view.quality == Quality::Exact,
+        _ => false,
+    }
 }
 
 fn next_style(of: BoneStyle) -> BoneStyle {

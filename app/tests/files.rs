@@ -6,12 +6,16 @@ use sinew::bake::xzx;
 use sinew::clip::Target;
 use sinew::frames::View;
 use sinew::io::picture::frames_of;
+use sinew::io::sheet_json::Style;
 use sinew::io::{self, Options};
-use sinew::render::Renderer;
+use sinew::render::{Renderer, Settings};
+use sinew::sheet::{Kind as Lie, SheetDesc};
+use sinew::time::{Marker, Range};
 use sinew_app::App;
+use sinew_app::jobs::film::{SheetWish, Wish};
 use sinew_app::jobs::open::{self, Kind, Source};
-use sinew_app::jobs::{film::Wish, recover, save};
-use sinew_app::state::{Change, Command, Edit, State};
+use sinew_app::jobs::{recover, save};
+use sinew_app::state::{Change, Command, Edit, Playback, State};
 use std::path::{Path, PathBuf};
 
 /// An empty folder, gone when the test is over.
@@ -45,6 +49,22 @@ pub fn wait(p: &mut Person) {
     panic!("the job does not end");
 }
 
+/// A small film of the clip that is edited.
+pub fn small(to: PathBuf, state: &State) -> Wish {
+    Wish {
+        to,
+        sheet: None,
+        settings: Settings { width: 48, height: 40, ..Settings::default() },
+        transparent: false,
+        view: View::default(),
+        renderer: Renderer::Raster,
+        rate: "6".parse().expect("a rate"),
+        clip: state.clip,
+        at: 0.0,
+        range: state.active().range,
+    }
+}
+
 fn nod() -> State {
     let mut state = State::open(pip());
     state.view.quality = sinew_app::state::Quality::Draft;
@@ -59,7 +79,18 @@ fn nod() -> State {
 fn what_is_saved_is_opened_equal() {
     let folder = Folder::new("save");
     let to = folder.0.join("pip.json");
-    let mut p = Person::at(nod());
+    let mut state = nod();
+    for edit in [
+        Edit::SetRate("30000/1001".parse().expect("a rate")),
+        Edit::SetRange(Range { start: 0.25, end: 1.5 }),
+        Edit::SetMarker(Marker { time: 0.75, name: "contact".into() }),
+        Edit::SetMarker(Marker { time: 0.5, name: "\"down\"".into() }),
+    ] {
+        state.update(Command::Do(edit)).expect("an edit");
+    }
+    let preview = Playback { range: Range { start: 0.5, end: 1.0 }, ..state.playback };
+    state.update(Command::SetPlayback(preview)).expect("a range");
+    let mut p = Person::at(state);
     assert!(p.state().unsaved());
     let ctx = p.ui.ctx.clone();
     let app: &mut App = p.ui.state_mut();
@@ -69,6 +100,9 @@ fn what_is_saved_is_opened_equal() {
     let again = open::read(&to).expect("what was written").state();
     assert_eq!(again.document.to_clips(), p.state().document.to_clips());
     assert_eq!(again.document.skeleton(), p.state().document.skeleton());
+    let of = |s: &State| (s.timeline(), s.document.rate, s.playback.range, s.clip);
+    assert_eq!(of(&again), of(p.state()));
+    assert_eq!(again.active().markers.len(), 2);
 
     // Another edit goes into the same poses; the rig is not touched.
     let rig = std::fs::read(&to).expect("the rig");
@@ -102,28 +136,22 @@ fn exports_hold_what_was_edited() {
 
     // A film and a sheet, as the command line makes them.
     let mut p = Person::at(state);
-    let wish = |name: &str, sheet: bool| Wish {
-        to: folder.0.join(name),
-        sheet,
-        size: [48, 40],
-        view: View::default(),
-        renderer: Renderer::Raster,
-        rate: "6".parse().expect("a rate"),
-        clip: 0,
-        at: 0.0,
-        range: clips[0].playback(),
-    };
     let rays = Renderer::Ray(Default::default());
     let (film, still) = (Renderer::Raster, rays);
+    let grid = SheetWish { desc: SheetDesc::default(), sides: 1, json: Some(Style::TexturePacker) };
+    let desc = SheetDesc { kind: Lie::Trimmed, ..SheetDesc::default() };
+    let trimmed = SheetWish { desc, sides: 8, json: Some(Style::Aseprite) };
     for (name, sheet, renderer) in [
-        ("pip.gif", false, film),
-        ("pip.##.png", false, film),
-        ("pip.png", true, film),
-        ("still.png", false, still),
+        ("pip.gif", None, film),
+        ("pip.##.png", None, film),
+        ("pip.png", Some(grid), film),
+        ("trimmed.png", Some(trimmed), film),
+        ("still.png", None, still),
     ] {
         let ctx = p.ui.ctx.clone();
+        let wish = Wish { renderer, sheet, ..small(folder.0.join(name), p.state()) };
         let app = p.ui.state_mut();
-        app.jobs.export_film(&ctx, Wish { renderer, ..wish(name, sheet) }, &app.state);
+        app.jobs.export_film(&ctx, wish, &app.state);
         wait(&mut p);
     }
     let bytes = std::fs::read(folder.0.join("pip.gif")).expect("a film");
@@ -131,8 +159,14 @@ fn exports_hold_what_was_edited() {
     let stills = (1..100).take_while(|i| folder.0.join(format!("pip.{i:02}.png")).exists()).count();
     assert!(frames >= 4 && stills == frames, "{frames} {stills}");
     assert!(folder.0.join("pip.png").exists() && folder.0.join("still.png").exists());
-    let table = std::fs::read_to_string(folder.0.join("pip.json")).expect("a table");
-    assert_eq!(table.matches("\"rotated\"").count(), frames);
+    let table = |name: &str| std::fs::read_to_string(folder.0.join(name)).expect("a table");
+    assert_eq!(table("pip.json").matches("\"rotated\"").count(), frames);
+    // Eight sides, each with a tag of its own.
+    let (all, clip) = (table("trimmed.json"), &clips[0].name);
+    assert_eq!(all.matches("\"duration\"").count(), 8 * frames);
+    for side in ["s", "sw", "w", "nw", "n", "ne", "e", "se"] {
+        assert!(all.contains(&format!("\"{clip}/{side}\"")), "{side}");
+    }
 }
 
 #[test]
@@ -155,8 +189,8 @@ fn a_crash_loses_no_clip() {
     let state = nod();
     recover::keep(&folder.0, &file("rigs/pip.json"), &state.document).expect("it is kept");
     assert!(recover::left(&folder.0).is_empty(), "this program still runs");
-    let (opened, clips, rate) = recover::restore(&recover::own(&folder.0)).expect("it is found");
-    let found = recover::state(&opened, clips, rate);
+    let (opened, clips, timeline) = recover::restore(&recover::own(&folder.0)).expect("it is found");
+    let found = recover::state(&opened, clips, &timeline);
     assert_eq!(found.document.to_clips(), state.document.to_clips());
     assert!(found.unsaved() && opened.source.kind == Kind::Rig);
 }

@@ -4,7 +4,11 @@ use super::person::{CTRL, Person};
 use super::pip;
 use egui::{Event, Key, Modifiers, PointerButton, Vec2, vec2};
 use glam::Vec3;
+use sinew::asset::Asset;
+use sinew::character::{Binding, Character, Instance, MeshId};
 use sinew::clip::Target;
+use sinew::mesh::{Mesh, MeshData, MorphTarget};
+use sinew::skeleton::{BoneDesc, Skeleton};
 use sinew_app::state::{Change, Command, Edit, State};
 
 const NONE: Modifiers = Modifiers::NONE;
@@ -58,6 +62,34 @@ fn clicks_choose_keys() {
     p.click("Summary key 10");
     assert_eq!(selected(&p), 2, "a column of the summary is a pose");
     assert!(p.state().undo_name() == Some("Pose"), "choosing is no step of undo");
+}
+
+/// What a touchpad sends: the button is down and up before the next frame.
+#[test]
+fn taps_choose_keys_and_move_the_playhead() {
+    let mut p = posed();
+    let tap = |p: &mut Person, pos: egui::Pos2| {
+        p.hover(pos);
+        for pressed in [true, false] {
+            let (button, modifiers) = (PointerButton::Primary, NONE);
+            p.ui.event(Event::PointerButton { pos, button, pressed, modifiers });
+        }
+        p.ui.run_steps(3);
+    };
+    let at = p.place("shin.L.θ key 10").center();
+    tap(&mut p, at);
+    assert!(selected(&p) == 1 && !p.state().in_gesture());
+    p.hover(at + vec2(30.0, 0.0));
+    assert_eq!(p.times("shin.L"), [0.0, 10.0, 20.0], "nothing is held");
+    let ruler = p.place("Dope sheet ruler");
+    tap(&mut p, egui::pos2(at.x, ruler.bottom() - 3.0));
+    assert_eq!(p.state().frame_at(p.state().time), 10.0);
+    tap(&mut p, at + vec2(0.0, 80.0));
+    assert_eq!(selected(&p), 0);
+    p.pick("shin.L");
+    let curve = p.place("shin.L.θ2 key 10").center();
+    tap(&mut p, curve);
+    assert!(selected(&p) == 1 && !p.state().in_gesture());
 }
 
 #[test]
@@ -179,4 +211,58 @@ fn markers_keys_and_frames_are_stepped_through() {
     assert_eq!(p.state().frame_at(p.state().time), 10.0);
     p.key(NONE, Key::ArrowDown);
     assert_eq!(p.state().time, 0.0);
+}
+
+/// A face with two shapes, `w0` and `w1`.
+fn face() -> State {
+    let (skeleton, of) = Skeleton::new(vec![BoneDesc { length: 1.0, ..BoneDesc::new("head") }]).unwrap();
+    let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
+    let shape = |by: Vec3| MorphTarget { positions: vec![by; 3], ..MorphTarget::default() };
+    let data = MeshData {
+        name: "face".into(),
+        positions: corners.into(),
+        triangles: vec![[0, 1, 2]],
+        targets: vec![shape(Vec3::X), shape(Vec3::Y)],
+        ..MeshData::default()
+    };
+    let instance = Instance { mesh: MeshId(0), binding: Binding::Bone(of[0]), first_weight: 0 };
+    let mesh = Mesh::new(data).unwrap();
+    let character = Character::new(skeleton, vec![mesh], vec![instance], vec![0.0; 2], vec![]).unwrap();
+    State::open(Asset { character, ..Asset::default() }.into())
+}
+
+#[test]
+fn shapes_are_typed_dragged_keyed_and_taken_back() {
+    let mut p = Person::at(face());
+    let before = p.state().document.clone();
+    let keys = |p: &Person| {
+        let s = p.state();
+        let track = s.track_of(&Target::Weights { first: 0 })?;
+        Some((
+            s.active().tracks[track].curve.times().to_vec(),
+            s.active().tracks[track].curve.values().to_vec(),
+        ))
+    };
+    p.type_into("shape w1", "0.5");
+    assert_eq!((p.state().pose().weights.clone(), keys(&p)), (vec![0.0, 0.5], None));
+    assert!(p.state().undo_name() == Some("Shape"));
+
+    // Lost like a pose when the time changes; kept by a key.
+    p.type_into("Frame", "24");
+    assert_eq!(p.state().pose().weights, [0.0, 0.0]);
+    p.type_into("shape w1", "0.5");
+    p.hover(p.place("Dope sheet keys").center());
+    p.key(NONE, Key::I);
+    assert_eq!(keys(&p), Some((vec![1.0], vec![0.0, 0.5])));
+    p.key(NONE, Key::K);
+    p.type_into("Frame", "0");
+    let at = p.place("shape w0").center();
+    p.drag(at, at + vec2(25.0, 0.0), true);
+    let (times, values) = keys(&p).unwrap();
+    assert!(times == [0.0, 1.0] && values[0] > 0.1 && values[1] == 0.5, "{times:?} {values:?}");
+    assert_eq!(p.state().undo_name(), Some("Shape"));
+    while p.state().undo_name().is_some() {
+        p.key(CTRL, Key::Z);
+    }
+    assert!(p.state().document.same_bits(&before) && p.state().loose_weights.is_empty());
 }

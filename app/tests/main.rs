@@ -2,6 +2,7 @@
 
 mod files;
 mod keys;
+mod looks;
 mod person;
 mod random;
 mod session;

@@ -1,6 +1,6 @@
 //! Somebody at the editor: pointers, keys and names.
 
-use egui::{Event, Key, Modifiers, PointerButton, Pos2, Rect};
+use egui::{Event, Key, Modifiers, PointerButton, Pos2, Rect, Vec2};
 use egui_kittest::kittest::Queryable;
 use egui_kittest::{Harness, Node, TestRenderer};
 use sinew::clip::Target;
@@ -8,7 +8,7 @@ use sinew::image::Rgba8;
 use sinew::io::picture::{PngLevel, encode_png};
 use sinew_app::App;
 use sinew_app::paint::Paint;
-use sinew_app::state::{Quality, State, View};
+use sinew_app::state::{Quality, State};
 use std::sync::{Arc, Mutex};
 
 pub const CTRL: Modifiers = Modifiers::COMMAND;
@@ -18,6 +18,7 @@ pub const CTRL_SHIFT: Modifiers = Modifiers { shift: true, ..Modifiers::COMMAND 
 pub struct Person {
     pub ui: Harness<'static, App>,
     paint: Arc<Mutex<Paint>>,
+    size: Vec2,
 }
 
 /// Keeps textures for pictures.
@@ -30,26 +31,28 @@ impl TestRenderer for Textures {
 }
 
 impl Person {
-    pub fn at(state: State) -> Self {
+    pub fn at(mut state: State) -> Self {
+        // The picture of the character is not what is looked at here.
+        state.view.quality = Quality::Draft;
+        Self::sized(state, Vec2::new(1440.0, 900.0))
+    }
+
+    pub fn sized(state: State, size: Vec2) -> Self {
         let paint = Arc::new(Mutex::new(Paint::default()));
         let build = Harness::builder()
-            .with_size([1440.0, 900.0])
+            .with_size(size)
             .with_max_steps(64)
             .with_context_setup(sinew_app::set_up)
             .renderer(Textures(paint.clone()));
-        // The picture of the character is not what is looked at here.
-        let view = View { quality: Quality::Draft, ..state.view.clone() };
-        let mut app = App::new(state);
-        app.state.view = view;
-        let mut ui = build.build_ui_state(|ui, app: &mut App| app.ui(ui), app);
+        let mut ui = build.build_ui_state(|ui, app: &mut App| app.ui(ui), App::new(state));
         ui.run();
-        Self { ui, paint }
+        Self { ui, paint, size }
     }
 
     /// What is seen.
     pub fn picture(&self) -> Rgba8 {
         let paint = self.paint.lock().expect("one thread");
-        paint.draw(&self.ui.ctx, self.ui.output(), [1440.0, 900.0], egui::Color32::BLACK)
+        paint.draw(&self.ui.ctx, self.ui.output(), self.size.into(), egui::Color32::from_gray(27))
     }
 
     /// Left behind for whoever wants to look, where `SHOTS` names a folder.

@@ -5,10 +5,8 @@ use glam::{Quat, Vec3};
 use sinew::clip::Interpolation;
 use sinew::math::spline::Tangents;
 use sinew::skeleton::BoneId;
-use sinew::time::{Range, Rate};
-use sinew_app::state::{
-    Change, Command, Edit, LoopMode, Marker, Mirror, Mode, Playback, Spans, State, TrackKeys,
-};
+use sinew::time::{Marker, Range, Rate};
+use sinew_app::state::{Change, Command, Edit, LoopMode, Mirror, Mode, Playback, Spans, State, TrackKeys};
 
 /// SplitMix64.
 struct Rng(u64);

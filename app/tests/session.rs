@@ -1,14 +1,11 @@
 //! A real session without a window: pointers, keys and names, as a person would.
 
-use super::files::{Folder, wait};
+use super::files::{Folder, small, wait};
 use super::person::{CTRL, CTRL_SHIFT, Person};
 use super::pip;
 use egui::{Event, Key, Modifiers, PointerButton, pos2};
 use sinew::clip::Interpolation;
-use sinew::frames::View;
 use sinew::io::picture::frames_of;
-use sinew::render::Renderer;
-use sinew_app::jobs::film::Wish;
 use sinew_app::jobs::open;
 use sinew_app::state::State;
 
@@ -112,13 +109,11 @@ fn from_the_first_bone_to_the_last_frame() {
     assert_eq!(again.document.to_clips(), p.state().document.to_clips());
 
     // And out, to whoever plays it.
-    let (clip, range) = (p.state().clip, p.state().active().range);
+    let clip = p.state().clip;
     let app = p.ui.state_mut();
     app.jobs.export_gltf(&ctx, glb.clone(), &app.state);
     wait(&mut p);
-    let (view, renderer, rate) = (View::default(), Renderer::Raster, "6".parse().expect("a rate"));
-    let wish =
-        Wish { to: gif.clone(), sheet: false, size: [48, 40], view, renderer, rate, clip, at: 0.0, range };
+    let wish = small(gif.clone(), p.state());
     let app = p.ui.state_mut();
     app.jobs.export_film(&ctx, wish, &app.state);
     wait(&mut p);

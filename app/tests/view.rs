@@ -136,6 +136,13 @@ fn overlays_are_drawn_and_nothing_is_drawn_twice() {
         assert!(now != last, "{name} is seen");
         last = now;
     }
+    // Ghosts and body stay as they are while bones change.
+    let triangles = |p: &Person| p.ui.state().viewport.cost.triangles;
+    let all = triangles(&p);
+    view(&mut p, |v| v.bones = BoneStyle::Pyramids);
+    assert!((1..all / 4).contains(&triangles(&p)), "{all} {}", triangles(&p));
+    view(&mut p, |v| v.bones = BoneStyle::Hidden);
+
     // Where no bones are shown, the skin is picked.
     view(&mut p, |v| (v.onion, v.paths) = (false, false));
     choose(&mut p, "root");

@@ -35,7 +35,42 @@ struct Job {
     /// Its share beside the others'.
     weight: f64,
     /// What it was made into with the share at hand; none if it only shows the rest.
-    made: Option<(Curve, bool)>,
+    made: Option<Made>,
+}
+
+/// What a track was made into.
+#[derive(Clone)]
+struct Made {
+    curve: Curve,
+    /// Whether its values are integers in the file.
+    short: bool,
+    form: Form,
+    /// By how much wider pieces were tried (see [`fit::fitted`]).
+    wider: f64,
+}
+
+/// How keys were found.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Form {
+    /// Straight pieces.
+    Straight,
+    /// As they were.
+    Kept,
+    /// Cubics with slopes by a rule.
+    Rule,
+    /// Cubics with slopes of their own.
+    Slopes,
+}
+
+/// How much is tried for a track.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Effort {
+    /// Straight pieces: enough to see where the share will be.
+    Draft,
+    /// What served last time.
+    Again,
+    /// All forms.
+    Full,
 }
 
 /// All tracks of a clip.
@@ -96,10 +131,17 @@ impl<'a> Plan<'a> {
 
     /// Bring the share close to the largest that keeps `aim`.
     fn narrow(&mut self, gauge: &Gauge, looks: &Looks, aim: f64, draft: bool) {
+        // Drafts only show the neighbourhood.
+        let (rounds, close) = if draft { (14, 0.85) } else { (6, 0.95) };
         let (mut low, mut high) = (0.0, f64::INFINITY);
         let mut best = None;
-        for _ in 0..if draft { 14 } else { 6 } {
-            self.make_all(gauge, draft);
+        for round in 0..rounds {
+            let effort = match (draft, round) {
+                (true, _) => Effort::Draft,
+                (false, 0) => Effort::Full,
+                (false, _) => Effort::Again,
+            };
+            self.make_all(gauge, effort);
             let error = gauge.most(looks, &self.assemble());
             if error <= aim {
                 low = self.share;
@@ -107,9 +149,7 @@ impl<'a> Plan<'a> {
             } else {
                 high = self.share;
             }
-            // Drafts only show the neighbourhood.
-            let enough = error <= aim && error > aim * if draft { 0.85 } else { 0.95 };
-            if enough || high < 1.05 * low {
+            if (error <= aim && error > close * aim) || high < 1.05 * low {
                 break;
             }
             // Errors grow about as the share does.
@@ -151,7 +191,7 @@ impl<'a> Plan<'a> {
                 }
                 let kept = (self.jobs[i].weight, self.jobs[i].made.clone());
                 self.jobs[i].weight *= factor;
-                self.jobs[i].made = self.made(i, false);
+                self.jobs[i].made = self.made(i, Effort::Full);
                 if self.jobs[i].keys() < before {
                     work -= 1;
                     if !gauge.strays(looks, &self.assemble(), aim) {
@@ -166,35 +206,35 @@ impl<'a> Plan<'a> {
     /// With a part of the shares.
     pub fn within(&mut self, gauge: &Gauge, part: f64) -> Baked {
         self.share *= part;
-        self.make_all(gauge, false);
+        self.make_all(gauge, Effort::Again);
         self.finish()
     }
 
     /// Nothing left out.
     pub fn untouched(&mut self) -> Baked {
         for job in &mut self.jobs {
-            job.made = Some((job.source.clone(), false));
+            job.made = Some(Made { curve: job.source.clone(), short: false, form: Form::Kept, wider: 1.0 });
         }
         self.finish()
     }
 
-    fn make_all(&mut self, gauge: &Gauge, draft: bool) {
+    fn make_all(&mut self, gauge: &Gauge, effort: Effort) {
         let all: Vec<usize> = (0..self.jobs.len()).collect();
-        let made = gauge.map(&all, |i| self.made(i, draft));
+        let made = gauge.map(&all, |i| self.made(i, effort));
         self.jobs.iter_mut().zip(made).for_each(|(job, made)| job.made = made);
     }
 
-    fn made(&self, i: usize, draft: bool) -> Option<(Curve, bool)> {
+    fn made(&self, i: usize, effort: Effort) -> Option<Made> {
         let job = &self.jobs[i];
         let allowed = self.share * job.weight * self.desc.tolerance / job.lever;
-        job.reduced(allowed, &self.desc, draft)
+        job.reduced(allowed, &self.desc, effort)
     }
 
     fn assemble(&self) -> Clip {
-        let tracks = self.jobs.iter().filter_map(|j| {
-            let (curve, _) = j.made.as_ref()?;
-            Some(Track { target: j.target.clone(), curve: curve.clone() })
-        });
+        let tracks = self
+            .jobs
+            .iter()
+            .filter_map(|j| Some(Track { target: j.target.clone(), curve: j.made.as_ref()?.curve.clone() }));
         let mut clip = Clip { name: self.clip.name.clone(), tracks: tracks.collect() };
         self.hold_ends(&mut clip);
         if self.desc.cycle { edit::close(&clip, SEAM) } else { clip }
@@ -221,7 +261,7 @@ impl<'a> Plan<'a> {
 
     fn finish(&self) -> Baked {
         let clip = self.assemble();
-        let short: Vec<bool> = self.jobs.iter().filter_map(|j| j.made.as_ref()).map(|m| m.1).collect();
+        let short: Vec<bool> = self.jobs.iter().filter_map(|j| j.made.as_ref()).map(|m| m.short).collect();
         let keys = [self.clip.key_count(), clip.key_count()];
         let bytes = [bytes(self.clip, &[]), bytes(&clip, &short)];
         Baked { clip, short, report: Report { keys, bytes, ..Report::default() } }
@@ -274,11 +314,11 @@ impl Goal {
 
 impl Job {
     fn keys(&self) -> usize {
-        self.made.as_ref().map_or(0, |m| m.0.times().len())
+        self.made.as_ref().map_or(0, |m| m.curve.times().len())
     }
 
-    /// The fewest keys within `allowed`, and whether they are 16-bit integers.
-    fn reduced(&self, allowed: f64, desc: &BakeDesc, draft: bool) -> Option<(Curve, bool)> {
+    /// The fewest keys within `allowed`.
+    fn reduced(&self, allowed: f64, desc: &BakeDesc, effort: Effort) -> Option<Made> {
         let (s, goal) = (&self.samples, desc.goal);
         if s.is_constant(&self.rest, allowed) {
             return None;
@@ -289,10 +329,11 @@ impl Job {
             Some(unit) => v.iter().map(|x| (x * unit).round().clamp(-unit, unit) / unit).collect(),
             None => v.to_vec(),
         };
+        let made = |curve, short, form| Made { curve, short, form, wider: 1.0 };
         let first = stored(s.value(0));
         if s.is_constant(&first, allowed) {
             let curve = Curve::new(vec![s.times[0]], first, s.width, Interpolation::Hold);
-            return curve.ok().map(|c| (c, short));
+            return curve.ok().map(|c| made(c, short, Form::Straight));
         }
         if desc.keep_keys {
             // Slopes need more than 16 bits hold.
@@ -300,31 +341,45 @@ impl Job {
             let short = short && source.interpolation() != Interpolation::Hermite;
             let values = if short { stored(source.values()) } else { source.values().to_vec() };
             let curve = Curve::new(source.times().to_vec(), values, s.width, source.interpolation());
-            return curve.ok().map(|c| (c, short));
+            return curve.ok().map(|c| made(c, short, Form::Kept));
         }
         if self.source.interpolation() == Interpolation::Hold {
-            return Some((self.steps(allowed, stored), short));
+            return Some(made(self.steps(allowed, stored), short, Form::Straight));
+        }
+        let last = self.made.as_ref().filter(|_| effort == Effort::Again);
+        let tried = |form: Form| last.is_none_or(|last| last.form == form);
+        if last.is_some_and(|last| last.form == Form::Slopes) {
+            return Some(made(cubic::own_slopes(s, allowed), false, Form::Slopes));
         }
         let own = [Interpolation::Linear, Interpolation::Hermite].contains(&self.source.interpolation());
-        let pieces = fit::fitted(s, allowed, draft, stored);
-        let mut best = (self.straight(&pieces), short);
+        let wider = match last {
+            Some(last) if last.wider > 1.0 => std::slice::from_ref(&last.wider),
+            Some(_) => &[],
+            None if effort == Effort::Draft => &fit::WIDER_DRAFT,
+            None => &fit::WIDER,
+        };
+        let (pieces, wider) = fit::fitted(s, allowed, wider, stored);
+        let mut best = Made { wider, ..made(self.straight(&pieces), short, Form::Straight) };
         let mut others = vec![];
         // Keys that stay where all of them were share their times with other tracks.
         if goal == Goal::Bytes && self.source.interpolation() == Interpolation::Linear {
-            others.push((self.straight(&fit::all(s, stored)), short));
+            others.push(made(self.straight(&fit::all(s, stored)), short, Form::Kept));
         } else if own || goal == Goal::Keys {
-            others.push((self.source.clone(), false));
+            others.push(made(self.source.clone(), false, Form::Kept));
         }
         // No cubic is smaller than three straight pieces, and for a draft both cost the same error.
-        if pieces.keys.len() > 4 && !draft {
-            if goal == Goal::Keys {
-                others.push((cubic::by_rule(s, allowed), false));
+        if pieces.keys.len() > 4 && effort != Effort::Draft {
+            if goal == Goal::Keys && tried(Form::Rule) {
+                others.push(made(cubic::by_rule(s, allowed), false, Form::Rule));
             }
-            others.push((cubic::own_slopes(s, allowed), false));
+            if tried(Form::Slopes) {
+                others.push(made(cubic::own_slopes(s, allowed), false, Form::Slopes));
+            }
         }
-        for (curve, short) in others {
-            if goal.cost(&curve, short, &self.source) < goal.cost(&best.0, best.1, &self.source) {
-                best = (curve, short);
+        let cost = |made: &Made| goal.cost(&made.curve, made.short, &self.source);
+        for other in others {
+            if cost(&other) < cost(&best) {
+                best = Made { wider, ..other };
             }
         }
         Some(best)

@@ -2,6 +2,7 @@
 
 use crate::asset::{Asset, MountedLight};
 use crate::fk::Posed;
+use crate::image::color::linear_from_srgb;
 use crate::image::develop::Grade;
 use crate::render::outline::Outline;
 use crate::scene::{Camera, Lamp, Light, LightKind, Lighting, Material, MaterialPatch, Style};
@@ -64,6 +65,12 @@ pub struct Look {
 }
 
 impl Look {
+    /// Before what pictures of characters stand if nothing else is said, #e8eaed.
+    pub fn paper() -> [f32; 4] {
+        let [r, g, b] = [0xe8, 0xea, 0xed].map(|c| linear_from_srgb(c as f32 / 255.0));
+        [r, g, b, 1.0]
+    }
+
     /// Whether the rasterizer's own bytes are the picture.
     pub(super) fn is_direct(&self) -> bool {
         self.grade.is_plain() && !self.needs_stage()

@@ -1,7 +1,7 @@
 //! Where the character stands in its pictures, and whether its clip comes back to where it began.
 
 use super::fit::{self, Span};
-use super::{Moment, Shot, Worker};
+use super::{Moment, Pivot, Shot, ShotDesc, Turns, Worker};
 use crate::asset::Asset;
 use crate::render::raster::Stats;
 use crate::scene::Camera;
@@ -32,6 +32,20 @@ pub fn ground_point(asset: &Asset, clip: Option<usize>) -> DVec3 {
     let stands = near(low.x, high.x) && near(low.z, high.z);
     let below = if stands { DVec3::ZERO } else { (low + high) * 0.5 };
     DVec3::new(below.x, low.y, below.z)
+}
+
+impl ShotDesc {
+    /// The same, with a framing that holds the character from each of `sides` directions, unless it holds some already.
+    ///
+    /// # Panics
+    /// If the asset has no such clip.
+    pub fn from_sides(mut self, asset: &Asset, sides: u32) -> Self {
+        if sides > 1 && self.framing.turns == Turns::None {
+            self.framing.turns = Turns::Each(sides);
+            self.framing.pivot = Pivot::At(ground_point(asset, self.clip));
+        }
+        self
+    }
 }
 
 impl Shot<'_> {

@@ -34,6 +34,7 @@ pub mod still;
 pub mod stl;
 
 use crate::asset::Asset;
+use crate::time::Timeline;
 
 /// Vertices times bones beyond which binding each part to its closest bone would take minutes.
 #[cfg(feature = "io")]
@@ -94,6 +95,8 @@ pub struct Import {
     /// What is around the character, or there instead of one, where the file is a scene.
     #[cfg(feature = "io")]
     pub setting: Option<scene::Setting>,
+    /// Rate, ranges and markers, where a file of poses of ours has them.
+    pub timeline: Timeline,
     /// Everything that was dropped or repaired.
     pub warnings: Vec<Warning>,
 }

@@ -3,16 +3,19 @@
 //! 1. Each frame is cut to what is visible of it ([`visible`]), and equal cuts are kept once ([`Distinct`]).
 //! 2. A [`Layout`] says where each cut goes: in a [`grid`], or [`pack`]ed.
 //! 3. A [`Canvas`] takes the pixels, of whatever kind they are: colour, palette indices, normals, depth.
-//! 4. A [`Sheet`] says what was put where; `io::sheet_json` writes that down for game engines.
+//! 4. An [`Assembler`] does all that with frames as they come.
+//! 5. A [`Sheet`] says what was put where; `io::sheet_json` writes that down for game engines.
 //!
 //! Frames are seen from several directions as [`directions`] names them.
 
+mod assemble;
 mod canvas;
 mod directions;
 mod distinct;
 mod layout;
 mod rect;
 
+pub use assemble::{Assembler, Frames, Kind, Placed, SheetDesc};
 pub use canvas::Canvas;
 pub use directions::{Direction, directions};
 pub use distinct::Distinct;

@@ -1,6 +1,6 @@
 //! Questions over the panes: which file, what to export, what about unsaved changes.
 
-use super::film::Wish;
+use super::film::{SheetWish, Wish};
 use super::open::{Kind, Source};
 use super::{Jobs, Outcome, recover};
 use crate::Bus;
@@ -8,8 +8,11 @@ use crate::state::State;
 use crate::viewport::orbit::Orbit;
 use egui::{Align2, ProgressBar, RichText, TextEdit, Window};
 use sinew::frames::View;
-use sinew::render::Renderer;
+use sinew::io::sheet_json::Style;
 use sinew::render::ray::RaySettings;
+use sinew::render::{Renderer, Settings};
+use sinew::sheet::{Kind as Lie, SheetDesc};
+use sinew::time::{Range, Rate};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
@@ -35,12 +38,21 @@ pub struct Export {
     kind: &'static str,
     size: [usize; 2],
     as_shown: bool,
-    rays: bool,
+    transparent: bool,
+    smooth: bool,
+    /// Samples a pixel, where it is ray traced.
+    rays: Option<u32>,
+    rate: Rate,
+    range: Range,
+    sheet: SheetWish,
 }
+
+/// Rays a pixel, at first.
+const RAYS: u32 = 16;
 
 /// Kinds of export: name, what stands behind the file's stem, and help.
 const KINDS: [(&str, &str, &str); 5] = [
-    ("GLB", ".glb", "The character with its clips, for other programs"),
+    ("GLB", "-edited.glb", "The character with its clips, for other programs"),
     ("GIF", ".gif", "The clip as a film; .webp, .apng and .y4m work as well"),
     ("frames", ".####.png", "A picture a frame"),
     ("sheet", ".sheet.png", "All frames in one picture, and a table of them"),
@@ -60,12 +72,21 @@ impl Ask {
         Self::Save { path: path.unwrap_or("rig.json".into()).display().to_string() }
     }
 
-    pub fn export(source: Option<&Source>, still: bool) -> Self {
+    pub fn export(source: Option<&Source>, state: &State, still: bool) -> Self {
         let stem = source.map_or("clip".into(), |s| s.path.with_extension("").display().to_string());
         let (kind, ending, _) = KINDS[if still { 4 } else { 0 }];
-        let tail = if kind == "GLB" { "-edited" } else { "" };
-        let path = format!("{stem}{tail}{ending}");
-        Self::Export(Export { path, kind, size: [512, 512], as_shown: still, rays: still })
+        Self::Export(Export {
+            path: format!("{stem}{ending}"),
+            kind,
+            size: [512, 512],
+            as_shown: still,
+            transparent: false,
+            smooth: true,
+            rays: still.then_some(RAYS),
+            rate: state.document.rate,
+            range: state.active().range,
+            sheet: SheetWish { desc: SheetDesc::default(), sides: 1, json: Some(Style::default()) },
+        })
     }
 
     /// A path from the system's dialog.
@@ -95,6 +116,9 @@ fn path_line(ui: &mut egui::Ui, path: &mut String) -> Answer {
         let edit = ui.add(TextEdit::singleline(path).desired_width(420.0)).labelled_by(named);
         if edit.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) {
             answer = Answer::Do;
+        } else if ui.memory(|m| m.focused().is_none()) {
+            // Whoever types means the path.
+            edit.request_focus();
         }
         if ui.button("Browse…").on_hover_text("The system's own dialog").clicked() {
             answer = Answer::Browse;
@@ -204,43 +228,119 @@ impl Export {
         let answer = path_line(ui, &mut self.path);
         warn_of_loss(ui, &self.path);
         if self.kind != "GLB" {
-            ui.horizontal(|ui| {
-                for (k, name) in ["Width", "Height"].into_iter().enumerate() {
-                    let label = ui.label(name).id;
-                    ui.add(egui::DragValue::new(&mut self.size[k]).range(1..=8192).suffix(" px")).labelled_by(label);
-                }
-                ui.checkbox(&mut self.as_shown, "as the viewport stands").on_hover_text(
-                    "Otherwise from where the command line looks: yaw 30°, pitch 12°, the whole clip in the picture",
-                );
-                ui.checkbox(&mut self.rays, "ray traced").on_hover_text("16 rays a pixel, with shadows; slow");
-            });
+            self.pictures(ui);
+        }
+        if !["GLB", "still"].contains(&self.kind) {
+            self.times(ui);
+        }
+        if self.kind == "sheet" {
+            self.sheets(ui);
         }
         answer
     }
 
+    fn pictures(&mut self, ui: &mut egui::Ui) {
+        ui.horizontal(|ui| {
+            for (k, name) in ["Width", "Height"].into_iter().enumerate() {
+                number(ui, name, &mut self.size[k], 1..=8192, " px");
+            }
+            ui.checkbox(&mut self.as_shown, "as the viewport stands").on_hover_text(
+                "Otherwise from where the command line looks: yaw 30°, pitch 12°, the whole clip in the picture",
+            );
+        });
+        ui.horizontal(|ui| {
+            let mut rays = self.rays.is_some();
+            if ui.checkbox(&mut rays, "ray traced").on_hover_text("With shadows; slow").changed() {
+                self.rays = rays.then_some(RAYS);
+            }
+            match &mut self.rays {
+                Some(samples) => number(ui, "Rays a pixel", samples, 1..=4096, ""),
+                None => drop(
+                    ui.checkbox(&mut self.smooth, "smooth edges")
+                        .on_hover_text("Four samples a pixel, or one"),
+                ),
+            }
+            if self.kind != "sheet" {
+                let help = "Nothing behind the character; otherwise light paper";
+                ui.checkbox(&mut self.transparent, "transparent").on_hover_text(help);
+            }
+        });
+    }
+
+    fn times(&mut self, ui: &mut egui::Ui) {
+        ui.horizontal(|ui| {
+            let mut fps = self.rate.fps();
+            number(ui, "Frames a second", &mut fps, 1.0..=1000.0, "");
+            self.rate = Rate::from_fps(fps).unwrap_or(self.rate);
+            let Range { start, end } = &mut self.range;
+            number(ui, "From", start, -86_400.0..=*end, " s");
+            number(ui, "to", end, *start..=86_400.0, " s");
+        });
+    }
+
+    fn sheets(&mut self, ui: &mut egui::Ui) {
+        let SheetWish { desc, sides, json } = &mut self.sheet;
+        ui.horizontal(|ui| {
+            ui.radio_value(&mut desc.kind, Lie::Grid, "grid")
+                .on_hover_text("Rows and columns; a direction a row");
+            let help = "Cut to what is visible and packed, equal frames once";
+            ui.radio_value(&mut desc.kind, Lie::Trimmed, "trimmed").on_hover_text(help);
+            number(ui, "Directions", sides, 1..=64, "");
+            for (name, style) in [
+                ("TexturePacker", Some(Style::TexturePacker)),
+                ("array", Some(Style::TexturePackerArray)),
+                ("Aseprite", Some(Style::Aseprite)),
+                ("no table", None),
+            ] {
+                ui.radio_value(json, style, name).on_hover_text("The table of frames beside the picture");
+            }
+        });
+    }
+
     fn wish(&self, state: &State, camera: &Orbit) -> Wish {
-        let view = match self.as_shown {
-            true => View::LookAt {
+        let sheet = (self.kind == "sheet").then_some(self.sheet);
+        let view = match (self.as_shown, View::default()) {
+            (true, _) => View::LookAt {
                 eye: camera.eye(),
                 target: camera.target,
                 up: camera.axes()[1].as_vec3(),
                 fov_y: Orbit::FOV as f32,
             },
-            false => View::default(),
+            // Directions start in front of the character.
+            (_, View::Orbit { pitch, fov_y, .. }) if sheet.is_some_and(|s| s.sides > 1) => {
+                View::Orbit { yaw: 0.0, pitch, fov_y }
+            }
+            (_, view) => view,
         };
-        let rays = RaySettings { samples: 16, ..RaySettings::default() };
+        let rays = |samples| Renderer::Ray(RaySettings { samples, ..RaySettings::default() });
+        let [width, height] = self.size;
+        let samples = if self.smooth { 4 } else { 1 };
         Wish {
             to: self.path.trim().into(),
-            sheet: self.kind == "sheet",
-            size: self.size,
+            sheet,
+            settings: Settings { width, height, samples, threads: 1 },
+            transparent: self.transparent,
             view,
-            renderer: if self.rays { Renderer::Ray(rays) } else { Renderer::Raster },
-            rate: state.document.rate,
+            renderer: self.rays.map_or(Renderer::Raster, rays),
+            rate: self.rate,
             clip: state.clip,
             at: state.time,
-            range: state.active().range,
+            range: self.range,
         }
     }
+}
+
+/// A number with its name before it.
+fn number<N: egui::emath::Numeric>(
+    ui: &mut egui::Ui,
+    name: &str,
+    of: &mut N,
+    range: std::ops::RangeInclusive<N>,
+    unit: &str,
+) {
+    let label = ui.label(name).id;
+    let decimals = if N::INTEGRAL { 0 } else { 3 };
+    ui.add(egui::DragValue::new(of).range(range).suffix(unit).max_decimals(decimals)).labelled_by(label);
 }
 
 impl Jobs {
@@ -307,8 +407,8 @@ impl Jobs {
             }
             (Some(Ask::Recover(kept)), Answer::Do) => {
                 self.start(ctx, "Recovering".into(), move |_| match recover::restore(&kept) {
-                    Ok((opened, clips, rate)) => {
-                        let state = recover::state(&opened, clips, rate);
+                    Ok((opened, clips, timeline)) => {
+                        let state = recover::state(&opened, clips, &timeline);
                         Outcome::Recovered(Box::new(state), opened.source, kept)
                     }
                     Err(why) => Outcome::Failed(why),

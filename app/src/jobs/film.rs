@@ -5,7 +5,7 @@ use super::open::named;
 use super::save::put;
 use sinew::asset::Asset;
 use sinew::clip::Clip;
-use sinew::frames::{Moment, Shot, ShotDesc, Stop, View, Worker, in_order_pairs};
+use sinew::frames::{Look, Moment, Shot, ShotDesc, Stop, View, Worker, in_order_pairs};
 use sinew::image::Rgba8;
 use sinew::io::picture::{
     AtomicFile, Coding, Film, FilmWriter, Folder, Format, FrameEncoder, Output, Palette, PngLevel, Target,
@@ -13,19 +13,20 @@ use sinew::io::picture::{
 };
 use sinew::io::sheet_json::{Style, to_json};
 use sinew::render::{Renderer, Settings};
-use sinew::sheet::{Canvas, Limits, Margins, Sheet, Sprite, Tag, durations, grid};
+use sinew::sheet::{Assembler, Direction, Frames, SheetDesc, directions};
 use sinew::time::{Range, Rate, frame_count, frame_time};
-use std::path::Path;
 
 /// What is drawn, and into what.
 #[derive(Clone, Debug)]
 pub struct Wish {
     /// The file, with `####` for a sequence.
     pub to: std::path::PathBuf,
-    /// All frames in one picture, and a JSON file beside it.
-    pub sheet: bool,
-    /// Pixels across and down.
-    pub size: [usize; 2],
+    /// All frames in one picture.
+    pub sheet: Option<SheetWish>,
+    /// Pixels across and down, samples of the rasterizer.
+    pub settings: Settings,
+    /// Nothing behind the character.
+    pub transparent: bool,
     /// From where.
     pub view: View,
     /// Raster or rays.
@@ -38,6 +39,17 @@ pub struct Wish {
     pub at: f64,
     /// The moments of a film.
     pub range: Range,
+}
+
+/// How frames become one picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SheetWish {
+    /// How they lie.
+    pub desc: SheetDesc,
+    /// Sides that the character is seen from.
+    pub sides: u8,
+    /// The file beside the picture.
+    pub json: Option<Style>,
 }
 
 /// Frames that a film may have.
@@ -57,32 +69,41 @@ pub fn write(
 ) -> Result<String, Option<String>> {
     let fail = |e: &dyn std::fmt::Display| Some(named(&wish.to, e));
     let target = Target::parse(&wish.to).map_err(|e| fail(&e))?;
-    let settings = Settings { width: wish.size[0], height: wish.size[1], ..Settings::default() };
-    settings.check().map_err(|e| fail(&e))?;
+    wish.settings.check().map_err(|e| fail(&e))?;
     let character = asset.character.clone().with_clips(clips).map_err(|e| fail(&e))?;
     let asset = Asset { character, ..asset.clone() };
+    let clear = wish.transparent || wish.sheet.is_some();
+    let single = matches!(target, Target::Still(_, f) if !f.is_film()) && wish.sheet.is_none();
     let desc = ShotDesc {
         clip: Some(wish.clip),
         view: wish.view,
         renderer: wish.renderer,
-        settings,
+        settings: Settings { threads: if single { threads() } else { 1 }, ..wish.settings },
+        look: Look { background: if clear { [0.0; 4] } else { Look::paper() }, ..Look::default() },
         ..ShotDesc::default()
     };
-    let shot = Shot::new(&asset, desc).map_err(|e| fail(&e))?;
-    let single = matches!(target, Target::Still(_, f) if !f.is_film()) && !wish.sheet;
+    let sides = wish.sheet.map_or(1, |s| s.sides);
+    let shot = Shot::new(&asset, desc.from_sides(&asset, sides.into())).map_err(|e| fail(&e))?;
     let count =
         if single { 1 } else { frame_count(wish.range, wish.rate.fps(), MOST).map_err(|e| fail(&e))? };
     let time =
         |i: usize| if single { wish.at } else { frame_time(wish.range.start, i as i64 + 1, wish.rate) };
-    let job = Job { wish, shot: &shot, target, count, time: &time, control };
-    if wish.sheet {
-        job.sheet()?;
+    let name = &asset.character.clips()[wish.clip].name;
+    let job = Job { wish, shot: &shot, target, count, sides: directions(sides.into()), time: &time, control };
+    if let Some(sheet) = wish.sheet {
+        job.sheet(sheet, name)?;
     } else if job.target.is_film(count) {
         job.film()?;
     } else {
         job.stills()?;
     }
-    Ok(format!("{count} frames → {}", job.target.name().display()))
+    let from = if sides > 1 { format!(" from {sides} sides") } else { String::new() };
+    let frames = if single { "1 picture".into() } else { format!("{count} frames") };
+    Ok(format!("{frames}{from} → {}", job.target.name().display()))
+}
+
+fn threads() -> usize {
+    std::thread::available_parallelism().map_or(1, |n| n.get())
 }
 
 struct Job<'a> {
@@ -90,6 +111,8 @@ struct Job<'a> {
     shot: &'a Shot<'a>,
     target: Target,
     count: usize,
+    /// A sheet has so many frames of each.
+    sides: Vec<Direction>,
     time: &'a (dyn Fn(usize) -> f64 + Sync),
     control: &'a Control,
 }
@@ -99,9 +122,14 @@ impl Job<'_> {
         Some(named(&self.wish.to, &e))
     }
 
+    /// The moment of a frame, side by side.
+    fn moment(&self, i: usize) -> Moment {
+        Moment { time: (self.time)(i % self.count), turn: self.sides[i / self.count].turn }
+    }
+
     fn draw(&self, worker: &mut Worker, i: usize) -> Rgba8 {
         let mut picture = Rgba8::default();
-        self.shot.draw(Moment::from((self.time)(i)), worker, &mut picture);
+        self.shot.draw(self.moment(i), worker, &mut picture);
         picture
     }
 
@@ -112,13 +140,12 @@ impl Job<'_> {
         encode: impl Fn(&mut S, Option<&Rgba8>, &Rgba8) -> T + Sync,
         mut take: impl FnMut(usize, T) -> Result<(), Option<String>>,
     ) -> Result<(), Option<String>> {
-        let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
-        let mut fault = None;
+        let (mut fault, all) = (None, self.count * self.sides.len());
         let start = || (Worker::default(), state());
         let first = |s: &mut (Worker, S), i: usize| self.draw(&mut s.0, i);
         let second = |s: &mut (Worker, S), before: Option<&Rgba8>, now: &Rgba8| encode(&mut s.1, before, now);
-        let done = in_order_pairs(self.count, threads, start, first, second, |i, result| {
-            let taken = match self.control.goes_on((i + 1) as f32 / self.count as f32) {
+        let done = in_order_pairs(all, threads(), start, first, second, |i, result| {
+            let taken = match self.control.goes_on((i + 1) as f32 / all as f32) {
                 true => take(i, result),
                 false => Err(None),
             };
@@ -153,7 +180,8 @@ impl Job<'_> {
     }
 
     fn film(&self) -> Result<(), Option<String>> {
-        let film = Film::new(self.wish.size, self.count as u32, self.wish.rate);
+        let (size, frames) = (self.shot.size(), self.count as u32);
+        let film = Film { transparent: self.wish.transparent, ..Film::new(size, frames, self.wish.rate) };
         let coding = match self.target.format() {
             Format::Gif => {
                 let few = self.count.min(SAMPLES);
@@ -183,47 +211,41 @@ impl Job<'_> {
         out.commit().map_err(|e| self.fail(e))
     }
 
-    fn sheet(&self) -> Result<(), Option<String>> {
-        let columns = (self.count as f64).sqrt().ceil() as usize;
-        let layout = grid(self.count, self.wish.size, columns, Margins::default(), Limits::default());
-        let layout = layout.map_err(|e| self.fail(e))?;
-        let mut canvas = Canvas::new(&layout, [0_u8; 4]);
+    fn sheet(&self, wish: SheetWish, clip: &str) -> Result<(), Option<String>> {
+        let (size, desc) = (self.shot.size(), wish.desc);
+        let mut all =
+            Assembler::new(desc, self.count, self.sides.len(), size, [0_u8; 4]).map_err(|e| self.fail(e))?;
+        let cut = |p: &Rgba8| desc.cut(p.data.as_chunks::<4>().0.to_vec(), size, |p: &[u8; 4]| p[3] > 0);
         self.run(
             || (),
-            |(), _, p: &Rgba8| p.clone(),
-            |i, p| {
-                canvas.put(layout.places[i], p.data.as_chunks::<4>().0, 0);
-                Ok(())
-            },
+            |(), _, p| cut(p),
+            |_, (trim, pixels)| all.add(trim, pixels).map_err(|e| self.fail(e)),
         )?;
+        let (canvas, placed) = all.finish().map_err(|e| self.fail(e))?;
         let [width, height] = canvas.size;
         let picture = Rgba8 { width, height, data: canvas.pixels.into_flattened() };
-        let bytes = encode_png(&picture, PngLevel::Balanced).map_err(|e| self.fail(e))?;
-        put(&self.wish.to, &bytes).map_err(Some)?;
-        put(&self.wish.to.with_extension("json"), self.table(layout.size, &layout.places).as_bytes())
-            .map_err(Some)
-    }
+        let bytes = match self.target.format() {
+            Format::Webp => encode_webp(&picture),
+            _ => encode_png(&picture, PngLevel::default()),
+        };
+        put(&self.wish.to, &bytes.map_err(|e| self.fail(e))?).map_err(Some)?;
+        let Some(style) = wish.json else { return Ok(()) };
 
-    fn table(&self, size: [usize; 2], places: &[sinew::sheet::Rect]) -> String {
-        let name = &self.shot.desc().clip.map_or(String::new(), |c| format!("clip{c}"));
-        let times = durations(self.count, self.wish.rate);
-        let sprite = |(i, place): (usize, &sinew::sheet::Rect)| Sprite {
-            name: format!("{name}/{:04}", i + 1),
-            place: *place,
-            trim: sinew::sheet::Rect::whole(self.wish.size),
-            source: self.wish.size,
-            pivot: [0.5, 1.0],
-            duration_ms: times[i],
-        };
-        let sheet = Sheet {
-            image: Path::new(&self.wish.to).file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        // Where the character stands, for games.
+        let (mut worker, ground) = (Worker::default(), self.shot.ground_point());
+        let mut stands = |i| self.shot.project(self.moment(i), ground, &mut worker).unwrap_or([0.5, 1.0]);
+        let pivots: Vec<[f64; 2]> = (0..self.count * self.sides.len()).map(&mut stands).collect();
+        let numbers: Vec<i64> = (1..=self.count as i64).collect();
+        let frames = Frames {
+            clip,
+            sides: &self.sides,
+            numbers: &numbers,
             size,
-            indexed: false,
             rate: self.wish.rate,
-            sprites: places.iter().enumerate().map(sprite).collect(),
-            tags: vec![Tag { name: name.clone(), frames: 0..self.count }],
-            maps: vec![],
+            pivots: &pivots,
         };
-        to_json(&sheet, Style::default())
+        let image = self.wish.to.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let text = to_json(&frames.describe(&placed, image), style);
+        put(&self.wish.to.with_extension("json"), text.as_bytes()).map_err(Some)
     }
 }

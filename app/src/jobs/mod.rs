@@ -109,8 +109,8 @@ impl Jobs {
                 _ => self.ask = Some(Ask::save(self.source.as_ref())),
             },
             Task::SaveAs => self.ask = Some(Ask::save(self.source.as_ref())),
-            Task::Export => self.ask = Some(Ask::export(self.source.as_ref(), false)),
-            Task::Still => self.ask = Some(Ask::export(self.source.as_ref(), true)),
+            Task::Export => self.ask = Some(Ask::export(self.source.as_ref(), state, false)),
+            Task::Still => self.ask = Some(Ask::export(self.source.as_ref(), state, true)),
             Task::BakeXzx | Task::BakeQuaternions => self.bake(ctx, task, state),
             Task::Quit => self.leave(ctx, Then::Quit, state),
             _ => bus.tell(format!("{task:?} is nothing that files do")),
@@ -128,9 +128,9 @@ impl Jobs {
 
     /// Save to a file: a rig's poses into their place, anything else as a rig.
     pub fn save(&mut self, ctx: &egui::Context, to: PathBuf, state: &State) {
-        let (document, source) = (state.document.clone(), self.source.clone());
+        let (document, source, timeline) = (state.document.clone(), self.source.clone(), state.timeline());
         self.start(ctx, format!("Writing {}", to.display()), move |_| {
-            match save::save(&to, source.as_ref(), &document.asset, &document.to_clips()) {
+            match save::save(&to, source.as_ref(), &document.asset, &document.to_clips(), &timeline) {
                 Ok(notes) => Outcome::Saved(to, document, notes),
                 Err(why) => Outcome::Failed(why),
             }
@@ -319,7 +319,8 @@ impl Jobs {
             }
             Outcome::Failed(why) => {
                 self.after_save = None;
-                bus.tell(format!("{name}: {why}"));
+                let file = name.split_once(' ').map_or("", |n| n.1);
+                bus.tell(if why.contains(file) { why } else { format!("{name}: {why}") });
             }
             Outcome::Cancelled => bus.tell(format!("{name}: cancelled")),
         }

@@ -1,9 +1,10 @@
 //! Files to documents.
 
-use crate::state::State;
+use crate::state::{Document, State};
 use sinew::asset::Asset;
 use sinew::bake::xzx;
 use sinew::io::{self, Import, Options};
+use sinew::time::Timeline;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -35,12 +36,18 @@ pub struct Opened {
     pub asset: Arc<Asset>,
     /// What was dropped or repaired.
     pub notes: Vec<String>,
+    /// What it keeps beside the keys.
+    pub timeline: Timeline,
 }
 
 impl Opened {
     /// The document in the editor.
     pub fn state(&self) -> State {
-        State::open(self.asset.clone())
+        let mut document = Document::new(self.asset.clone());
+        document.set_timeline(&self.timeline);
+        let mut state = State::with_document(document);
+        state.set_timeline(&self.timeline);
+        state
     }
 }
 
@@ -50,7 +57,7 @@ impl Opened {
 /// A message that says which file, where in it, and what is wrong.
 pub fn read(path: &Path) -> Result<Opened, String> {
     let import = io::import(path, &Options { textures: true }).map_err(|e| named(path, &e))?;
-    let Import { mut asset, format, warnings, .. } = import;
+    let Import { mut asset, format, timeline, warnings, .. } = import;
     let kind = match format.as_str() {
         "glTF" => Kind::Gltf,
         "sinew rig" => Kind::Rig,
@@ -68,7 +75,7 @@ pub fn read(path: &Path) -> Result<Opened, String> {
     }
     let source = Source { path: path.to_owned(), kind };
     let notes = warnings.iter().map(ToString::to_string).collect();
-    Ok(Opened { source, asset: Arc::new(asset), notes })
+    Ok(Opened { source, asset: Arc::new(asset), notes, timeline })
 }
 
 /// A message with the file's name, once.

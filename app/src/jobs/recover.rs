@@ -5,14 +5,13 @@ use super::save::put;
 use crate::state::{Document, State};
 use sinew::clip::Clip;
 use sinew::io::rig_json;
-use sinew::time::Rate;
+use sinew::time::Timeline;
 use std::path::{Path, PathBuf};
 
 #[derive(serde::Serialize, serde::Deserialize)]
 struct Kept {
     sinew_recovery: u32,
     file: PathBuf,
-    rate: [u16; 2],
     poses: String,
 }
 
@@ -54,10 +53,10 @@ fn runs(id: u32) -> bool {
 /// What the system says.
 pub fn keep(folder: &Path, file: &Path, document: &Document) -> Result<(), String> {
     std::fs::create_dir_all(folder).map_err(|e| open::named(folder, &e))?;
-    let poses = rig_json::export_poses(&document.asset.character, &document.to_clips()).document.to_text();
+    let poses = rig_json::export_poses(&document.asset.character, &document.to_clips()).document;
+    let poses = poses.with_timeline(&document.timeline()).to_text();
     let file = std::path::absolute(file).unwrap_or_else(|_| file.to_owned());
-    let rate = [document.rate.frames(), document.rate.seconds()];
-    let kept = Kept { sinew_recovery: 1, file, rate, poses };
+    let kept = Kept { sinew_recovery: 1, file, poses };
     let text = serde_json::to_vec(&kept).map_err(|e| e.to_string())?;
     put(&own(folder), &text)
 }
@@ -72,23 +71,23 @@ pub fn file_of(path: &Path) -> Option<PathBuf> {
 ///
 /// # Errors
 /// What is wrong with the kept file or with the one that it belongs to.
-pub fn restore(path: &Path) -> Result<(open::Opened, Vec<Clip>, Rate), String> {
+pub fn restore(path: &Path) -> Result<(open::Opened, Vec<Clip>, Timeline), String> {
     let bad = |e: &dyn std::fmt::Display| open::named(path, e);
     let bytes = sinew::io::read_file(path).map_err(|e| bad(&e))?;
     let kept: Kept = serde_json::from_slice(&bytes).map_err(|e| bad(&e))?;
     let opened = open::read(&kept.file)?;
     let poses = rig_json::Poses::from_bytes(kept.poses.as_bytes()).map_err(|e| bad(&e))?;
     let clips = poses.to_clips(&opened.asset.character).map_err(|e| bad(&e))?;
-    let rate = Rate::new(kept.rate[0], kept.rate[1]).map_err(|e| bad(&e))?;
-    Ok((opened, clips, rate))
+    let timeline = poses.timeline().map_err(|e| bad(&e))?;
+    Ok((opened, clips, timeline))
 }
 
 /// A state with recovered clips, to be saved or undone.
-pub fn state(opened: &open::Opened, clips: Vec<Clip>, rate: Rate) -> State {
+pub fn state(opened: &open::Opened, clips: Vec<Clip>, timeline: &Timeline) -> State {
     use crate::state::{Command, Edit};
     let mut state = opened.state();
     let replaced = state.update(Command::Do(Edit::ReplaceClips("Recover", clips)));
-    let rated = state.update(Command::Do(Edit::SetRate(rate)));
-    debug_assert!(replaced.is_ok() && rated.is_ok(), "poses that were checked");
+    debug_assert!(replaced.is_ok(), "poses that were checked");
+    state.set_timeline(timeline);
     state
 }

@@ -8,6 +8,7 @@ use sinew::clip::{Clip, Target};
 use sinew::image::Rgba8;
 use sinew::io::picture::{AtomicFile, Folder, PngLevel, encode_png};
 use sinew::io::{self, Options, Warning, gltf, rig_json};
+use sinew::time::Timeline;
 use std::path::{Path, PathBuf};
 
 /// Write bytes whole or not at all, over what is there.
@@ -27,6 +28,7 @@ pub fn save(
     source: Option<&Source>,
     asset: &Asset,
     clips: &[Clip],
+    timeline: &Timeline,
 ) -> Result<Vec<String>, String> {
     if !to.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
         let hint = "expected a name that ends in .json; glTF and pictures are exported";
@@ -34,7 +36,7 @@ pub fn save(
     }
     let own = source.is_some_and(|s| s.kind == Kind::Rig && s.path == to);
     if own {
-        return poses_of(to, &asset.character, clips);
+        return poses_of(to, &asset.character, clips, timeline);
     }
     let stem = to.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let names: Vec<String> = (0..asset.textures.len()).map(|i| format!("{stem}.{i}.png")).collect();
@@ -45,14 +47,20 @@ pub fn save(
     let poses = format!("{stem}.poses.json");
     rig.document.poses = Some(vec![poses.clone()]);
     let of_clips = rig_json::export_poses(&asset.character, clips);
-    put(&to.with_file_name(poses), of_clips.document.to_text().as_bytes())?;
+    let text = of_clips.document.with_timeline(timeline).to_text();
+    put(&to.with_file_name(poses), text.as_bytes())?;
     put(to, rig.document.to_text().as_bytes())?;
     let all = rig.warnings.iter().chain(&of_clips.warnings);
     Ok(all.map(Warning::to_string).collect())
 }
 
 /// Poses of a rig that stays as it is.
-fn poses_of(rig: &Path, character: &Character, clips: &[Clip]) -> Result<Vec<String>, String> {
+fn poses_of(
+    rig: &Path,
+    character: &Character,
+    clips: &[Clip],
+    timeline: &Timeline,
+) -> Result<Vec<String>, String> {
     let bytes = io::read_file(rig).map_err(|e| named(rig, &e))?;
     let mut document = rig_json::Rig::from_bytes(&bytes).map_err(|e| named(rig, &e))?;
     let folder = rig.parent().unwrap_or(Path::new(""));
@@ -75,7 +83,7 @@ fn poses_of(rig: &Path, character: &Character, clips: &[Clip]) -> Result<Vec<Str
         }
     };
     let poses = rig_json::export_poses(character, clips);
-    put(&place, poses.document.to_text().as_bytes())?;
+    put(&place, poses.document.with_timeline(timeline).to_text().as_bytes())?;
     Ok(poses.warnings.iter().map(Warning::to_string).collect())
 }
 

@@ -1,8 +1,9 @@
 //! Time along a pane: where a second is, the ruler, zoom and pan, the playhead.
 
 use crate::Bus;
-use crate::state::{Command, Edit, Marker, State, View};
+use crate::state::{Command, Edit, State, View};
 use egui::{Align2, Color32, FontId, PointerButton, Pos2, Rect, Sense, Stroke, Vec2, pos2};
+use sinew::time::Marker;
 
 /// Height of the ruler, points.
 pub const RULER: f32 = 26.0;
@@ -14,7 +15,7 @@ pub const SELECTED: Color32 = Color32::from_rgb(255, 190, 60);
 const SCALES: (f64, f64) = (1e-6, 3600.0);
 
 /// Seconds to points in one pane.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axis {
     /// Where keys are drawn, below the ruler.
     pub rect: Rect,
@@ -113,9 +114,8 @@ pub fn ruler(ui: &mut egui::Ui, axis: &Axis, name: &str, state: &State, bus: &mu
     let response = ui.interact(rect, ui.scope_id().with("ruler"), Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Slider, true, name));
     let held = response.is_pointer_button_down_on() && ui.input(|i| i.pointer.primary_down());
-    if let (true, Some(at)) =
-        (held || response.dragged_by(PointerButton::Primary), response.interact_pointer_pos())
-    {
+    let taken = held || response.dragged_by(PointerButton::Primary) || response.clicked();
+    if let (true, Some(at)) = (taken, response.interact_pointer_pos()) {
         // Beyond an edge the pane runs along, so the playhead stays in view.
         let x = at.x.clamp(rect.left(), rect.right());
         let over = at.x - x;

@@ -25,13 +25,19 @@ impl Bones {
         let field =
             egui::TextEdit::singleline(&mut self.filter).hint_text("filter").desired_width(f32::INFINITY);
         ui.add(field).accessible_name("Filter of the bones");
-        let rows = self.rows(state);
         let mut scroll = egui::ScrollArea::vertical().auto_shrink(false);
 
-        // A bone that was chosen elsewhere is brought into view, once.
+        // A bone that was chosen elsewhere is brought into view, once, whatever is folded above it.
         let active = state.selection.active();
-        if active != self.shown {
-            self.shown = active;
+        let elsewhere = std::mem::replace(&mut self.shown, active) != active;
+        if elsewhere {
+            let parent = |b: &BoneId| state.document.skeleton().parent(*b);
+            std::iter::successors(active.as_ref().and_then(parent), parent).for_each(|b| {
+                self.folded.remove(&b);
+            });
+        }
+        let rows = self.rows(state);
+        if elsewhere {
             if let Some(row) = rows.iter().position(|(b, _)| Some(*b) == active) {
                 let middle = row as f32 * ROW - ui.available_height() / 2.0;
                 scroll = scroll.vertical_scroll_offset(middle.max(0.0));

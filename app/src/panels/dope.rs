@@ -31,7 +31,8 @@ pub struct Dope {
     grip: Grip,
     last_time: f64,
     width: f32,
-    shown: Option<Arc<sinew::asset::Asset>>,
+    /// What time was framed for: another file or clip is looked at as a whole.
+    shown: Option<(Arc<sinew::asset::Asset>, usize)>,
     /// What a command asked for, to be done when the pane is drawn next.
     pub pending: Option<Task>,
 }
@@ -81,23 +82,31 @@ struct Block {
 /// What can be seen of `times`, in blocks.
 fn blocks(axis: &Axis, times: &[f64]) -> Vec<Block> {
     let seen = axis.visible(times);
-    let (mut out, mut k) = (Vec::new(), seen.start);
+    let (mut out, mut k, mut many) = (Vec::new(), seen.start, 1);
     while k < seen.end {
-        let end = first_from(times, k + 1, seen.end, times[k] + APART * axis.scale);
+        let end = first_from(times, k + 1..seen.end, times[k] + APART * axis.scale, k + many);
         out.push(Block { keys: k..end, from: axis.x(times[k]), to: axis.x(times[end - 1]) });
-        k = end;
+        (k, many) = (end, end - k);
     }
     out
 }
 
-/// The first key in `from..end` at `limit` or later: by strides that double, since it is near.
-fn first_from(times: &[f64], from: usize, end: usize, limit: f64) -> usize {
-    let (mut low, mut stride) = (from, 1);
-    while low + stride < end && times[low + stride] < limit {
-        low += stride;
+/// The first key of a run at `limit` or later, looked for around a guess by strides that double: as keys are about as far apart as
+/// they were, few are looked at, however many there are.
+fn first_from(times: &[f64], run: Range<usize>, limit: f64, guess: usize) -> usize {
+    let guess = guess.clamp(run.start, run.end);
+    let (mut low, mut high, mut stride) = (guess, guess, 1);
+    while high < run.end && times[high] < limit {
+        low = high + 1;
+        high = (high + stride).min(run.end);
         stride *= 2;
     }
-    low + times[low..end.min(low + stride + 1)].partition_point(|&t| t < limit)
+    while low > run.start && times[low - 1] >= limit {
+        high = low - 1;
+        low = low.saturating_sub(stride).max(run.start);
+        stride *= 2;
+    }
+    low + times[low..high].partition_point(|&t| t < limit)
 }
 
 impl Dope {
@@ -109,8 +118,9 @@ impl Dope {
         let keys = Rect::from_min_max(pane.min + Vec2::new(NAMES, RULER), pane.max);
         let axis = Axis::new(&state.view, keys);
         self.width = keys.width();
-        if !self.shown.as_ref().is_some_and(|a| Arc::ptr_eq(a, &state.document.asset)) {
-            self.shown = Some(state.document.asset.clone());
+        let same = |(a, c): &(Arc<_>, usize)| Arc::ptr_eq(a, &state.document.asset) && *c == state.clip;
+        if !self.shown.as_ref().is_some_and(same) {
+            self.shown = Some((state.document.asset.clone(), state.clip));
             let range = state.active().range;
             self.frame(range.start, range.end, state, bus);
         }
@@ -185,9 +195,15 @@ impl Dope {
         let shift = ui.input(|i| i.modifiers.shift || i.modifiers.command);
         let mode = if shift { Mode::Toggle } else { Mode::Replace };
         let pressed = ui.input(|i| i.pointer.button_pressed(PointerButton::Primary));
-        if pressed && sense.is_pointer_button_down_on() && at.x >= axis.rect.left() && at.y >= axis.rect.top()
-        {
+        // A tap is pressed and released within one frame.
+        let tapped = pressed && sense.clicked();
+        let down = pressed && sense.is_pointer_button_down_on();
+        if (down || tapped) && at.x >= axis.rect.left() && at.y >= axis.rect.top() {
             let (hit, selected) = self.hit(axis, body, at, state);
+            if tapped {
+                bus.send(Command::SelectKeys(hit, mode));
+                return;
+            }
             if hit.is_empty() {
                 self.grip.drag = Drag::Box { from: (here.0, f64::from(at.y - body.top() + self.scroll)) };
                 return;
@@ -292,7 +308,7 @@ impl Dope {
         let keys = painter.with_clip_rect(axis.rect);
         axis::grid(&keys, axis, state, ui.visuals());
         let mut mesh = egui::Mesh::default();
-        let mut names = Names(ui);
+        let mut names = Names::of(ui, "dope");
 
         // The summary, then the rows.
         let mid = axis.rect.top() + ROW / 2.0;
@@ -328,7 +344,10 @@ impl Dope {
             let name = track_name(skeleton, of);
             let clip =
                 rows.with_clip_rect(line.with_max_x(axis.rect.left() - 2.0).intersect(rows.clip_rect()));
-            clip.text(pos2(left, y), Align2::LEFT_CENTER, &name, font.clone(), text);
+            // Of a name that is too long the end is seen: it says which channel it is.
+            let galley = clip.layout_no_wrap(name.clone(), font.clone(), text);
+            let x = left.min(axis.rect.left() - 6.0 - galley.size().x);
+            clip.galley(pos2(x, y - galley.size().y / 2.0), galley, text);
             self.row(&mut drawn, axis, y, track, &name, state, &mut names, body);
         }
         keys.add(mesh);
@@ -380,6 +399,23 @@ impl Dope {
             say("No keys yet: pose a bone, then press I over the viewport or here");
         } else if self.rows.tracks.is_empty() {
             say("No track matches: clear the filter, or show more than the selected bones");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_key_is_found_from_any_guess() {
+        let times = [0.0, 1.0, 1.0, 2.0, 5.0, 9.0, 9.5];
+        for (from, limit, guess) in
+            (0..7).flat_map(|f| (0..22).flat_map(move |l| (0..9).map(move |g| (f, l, g))))
+        {
+            let limit = f64::from(limit) * 0.5;
+            let want = (from..6).find(|&k| times[k] >= limit).unwrap_or(from.max(6));
+            assert_eq!(first_from(&times, from..from.max(6), limit, guess), want, "{from} {limit} {guess}");
         }
     }
 }

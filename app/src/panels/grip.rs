@@ -1,10 +1,10 @@
 //! What a pointer does to keys, the same in the dope sheet and the graph.
 
-use super::axis::{Axis, SELECTED};
+use super::axis::SELECTED;
 use crate::Bus;
 use crate::commands::Task;
 use crate::state::{Command, Edit, Keys, Mode, State};
-use egui::{Key, PointerButton, Pos2};
+use egui::{Key, PointerButton};
 
 /// A drag under way.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -157,11 +157,6 @@ impl Grip {
             }),
         }
     }
-}
-
-/// The pointer's second in a pane.
-pub fn second(axis: &Axis, at: Pos2) -> f64 {
-    axis.t(at.x)
 }
 
 /// The box of a drag on empty ground, over the pane.

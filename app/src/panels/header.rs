@@ -2,7 +2,7 @@
 
 use super::parts::{button, gesture};
 use crate::Bus;
-use crate::commands::{ACTIONS, MENUS, named};
+use crate::commands::{ACTIONS, MENUS, is_on, named};
 use crate::state::{Command, Edit, LoopMode, Playback, State};
 use egui::{Color32, DragValue, RichText};
 use sinew::time::{Range, Rate};
@@ -112,7 +112,7 @@ fn menu_items(ui: &mut egui::Ui, menu: &str, state: &State, bus: &mut Bus) {
             "Redo" => state.redo_name().map_or("Redo".into(), |n| format!("Redo {}", n.to_lowercase())),
             name => name.to_string(),
         };
-        let mut button = egui::Button::new(&text);
+        let mut button = egui::Button::new(&text).selected(is_on(action, state));
         if let Some(s) = action.shortcut {
             button = button.shortcut_text(ui.ctx().format_shortcut(&s));
         }

@@ -37,6 +37,7 @@ pub fn gestures(of: Pane) -> &'static [(&'static str, &'static str)] {
             ("Wheel", "zoom at the pointer"),
             ("Shift + wheel, or over the names", "scroll rows"),
             ("Middle drag", "pan"),
+            ("T", "how tracks run: hold, linear, smooth; whole tracks, not keys"),
             ("Right click", "all that can be done to keys"),
             ("Esc", "cancel the drag"),
         ],
@@ -47,6 +48,7 @@ pub fn gestures(of: Pane) -> &'static [(&'static str, &'static str)] {
             ("Wheel", "zoom time at the pointer"),
             ("Shift + wheel, or over the numbers", "zoom values"),
             ("Middle drag", "pan; “fit” lets values fit again"),
+            ("T", "how tracks run: hold, linear, smooth; whole tracks, not keys"),
             ("Esc", "cancel the drag"),
         ],
     }
@@ -73,8 +75,8 @@ pub fn ui(ctx: &egui::Context, pane: Pane) -> bool {
         let own = if pane.has_time() { Scope::Time } else { Scope::Body };
         egui::ScrollArea::vertical().max_height(260.0).show(ui, |ui| {
             egui::Grid::new("keys").num_columns(2).striped(true).show(ui, |ui| {
-                let here = ACTIONS.iter().filter(|a| a.scope == own || a.scope == Scope::Any);
-                for (action, keys) in here.filter_map(|a| Some((a, a.shortcut?))) {
+                let of = |scope| ACTIONS.iter().filter(move |a| a.scope == scope);
+                for (action, keys) in of(own).chain(of(Scope::Any)).filter_map(|a| Some((a, a.shortcut?))) {
                     ui.strong(ui.ctx().format_shortcut(&keys));
                     ui.label(action.name).on_hover_text(action.help);
                     ui.end_row();

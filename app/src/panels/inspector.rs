@@ -15,6 +15,7 @@ use sinew::skeleton::BoneId;
 pub struct Inspector {}
 
 const ORANGE: Color32 = Color32::from_rgb(255, 150, 60);
+const LOOSE: &str = "posed, not keyed: press I, or it is lost when the time changes";
 
 impl Inspector {
     /// Draw it.
@@ -23,6 +24,7 @@ impl Inspector {
             let Some(bone) = state.selection.active() else {
                 ui.weak("Select a bone: in the tree, or in the viewport.");
                 asset(ui, state);
+                shapes(ui, state, bus);
                 return;
             };
             head(ui, bone, state, bus);
@@ -30,6 +32,7 @@ impl Inspector {
             quaternion(ui, bone, state);
             vectors(ui, bone, state, bus);
             tracks(ui, bone, state, bus);
+            shapes(ui, state, bus);
         });
     }
 }
@@ -40,12 +43,43 @@ fn asset(ui: &mut egui::Ui, state: &State) {
     let vertices: usize = c.instances().iter().map(|i| c.mesh(i).positions.len()).sum();
     ui.separator();
     let lines = [
-        format!("{} bones", c.skeleton().len()),
-        format!("{} meshes, {vertices} vertices", c.meshes().len()),
-        format!("{} clips", state.document.clips.len()),
-        format!("{} tracks in this clip", state.active().tracks.len()),
+        many(c.skeleton().len(), "bone", "bones"),
+        format!("{}, {vertices} vertices", many(c.meshes().len(), "mesh", "meshes")),
+        many(state.document.clips.len(), "clip", "clips"),
+        format!("{} in this clip", many(state.active().tracks.len(), "track", "tracks")),
     ];
     lines.into_iter().for_each(|l| drop(ui.label(l)));
+}
+
+fn many(n: usize, one: &str, more: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { more })
+}
+
+/// Weights of blend shapes, by the meshes that they change.
+fn shapes(ui: &mut egui::Ui, state: &State, bus: &mut Bus) {
+    let c = &state.document.asset.character;
+    let runs = c.weight_runs();
+    if runs.is_empty() {
+        return;
+    }
+    ui.separator();
+    ui.strong("Shapes").on_hover_text("Weights of blend shapes; I keys them, as it does bones");
+    let weights = state.weights();
+    for (first, width) in runs {
+        let own = c.instances().iter().find(|i| i.first_weight == first && !c.mesh(i).targets.is_empty());
+        ui.weak(own.map_or("", |i| &c.mesh(i).name));
+        egui::Grid::new(("shapes", first)).num_columns(2).show(ui, |ui| {
+            for i in first..first + width {
+                let (label, mut weight) = (format!("w{i}"), weights[i]);
+                let r =
+                    number(ui, &label, format!("shape {label}"), &mut weight, 0.01, "", (f32::MIN, f32::MAX));
+                gesture(&r, "Shape", Edit::Weight(i, weight), state, bus);
+            }
+        });
+    }
+    if !state.loose_weights.is_empty() {
+        ui.label(RichText::new(LOOSE).color(ORANGE));
+    }
 }
 
 fn head(ui: &mut egui::Ui, bone: BoneId, state: &State, bus: &mut Bus) {
@@ -67,9 +101,7 @@ fn head(ui: &mut egui::Ui, bone: BoneId, state: &State, bus: &mut Bus) {
         }
     });
     if state.loose.contains_key(&bone) {
-        let text =
-            RichText::new("posed, not keyed: press I, or it is lost when the time changes").color(ORANGE);
-        ui.label(text);
+        ui.label(RichText::new(LOOSE).color(ORANGE));
     }
 }
 
@@ -206,8 +238,8 @@ fn tracks(ui: &mut egui::Ui, bone: BoneId, state: &State, bus: &mut Bus) {
         let here = track.curve.key_at(state.time).is_some();
         let key = if here { "◆" } else { "◇" };
         let text = format!(
-            "{key} {channel}: {} keys, {}",
-            track.curve.times().len(),
+            "{key} {channel}: {}, {}",
+            many(track.curve.times().len(), "key", "keys"),
             interpolation_name(track.curve.interpolation())
         );
         ui.label(text).on_hover_text("◆ there is a key at the playhead · the interpolation is per track");

@@ -7,17 +7,20 @@ use crate::state::{Command, Edit, State};
 use egui::{Pos2, Rect, Sense, Vec2};
 
 /// Key nodes for assistive technology and for tests: there where somebody listens, of keys that can be seen.
-pub struct Names<'a>(pub &'a egui::Ui);
+pub struct Names<'a> {
+    ui: &'a egui::Ui,
+    heard: bool,
+}
 
-impl Names<'_> {
+impl<'a> Names<'a> {
+    /// Of a pane whose own node has that name.
+    pub fn of(ui: &'a egui::Ui, pane: &str) -> Self {
+        Self { ui, heard: ui.ctx().has_accesskit_node(ui.scope_id().with(pane)) }
+    }
+
     /// A node over a key, if somebody listens.
     pub fn add(&mut self, at: Pos2, name: impl Fn() -> String) {
-        let ui = self.0;
-        if !ui.ctx().has_accesskit_node(ui.scope_id().with("dope"))
-            && !ui.ctx().has_accesskit_node(ui.scope_id().with("graph"))
-        {
-            return;
-        }
+        let Self { ui, heard: true } = self else { return };
         let name = name();
         let rect = Rect::from_center_size(at, Vec2::splat(2.0 * axis::HIT));
         let response = ui.interact(rect, ui.scope_id().with(("key", &name)), Sense::hover());

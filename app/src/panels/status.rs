@@ -15,9 +15,13 @@ impl Status {
             quality(ui, state, bus);
             ui.separator();
             let c = viewport.cost;
+            let skin = match c.vertices {
+                0 => "skin kept".into(),
+                n => format!("skin {:.2} ms, {n} vertices", c.skin_ms),
+            };
             let text = format!(
-                "evaluate {:.2} ms · skin {:.2} ms, {} vertices · draw {:.2} ms, {} triangles, {} pixels",
-                c.evaluate_ms, c.skin_ms, c.vertices, c.draw_ms, c.triangles, c.pixels
+                "evaluate {:.2} ms · {skin} · draw {:.2} ms, {} triangles, {} × {} pixels",
+                c.evaluate_ms, c.draw_ms, c.triangles, c.size[0], c.size[1]
             );
             ui.label(text).on_hover_text("What the last picture that was drawn anew cost");
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
@@ -39,7 +43,11 @@ fn quality(ui: &mut egui::Ui, state: &State, bus: &mut Bus) {
     for (value, name, help) in [
         (Quality::Draft, "draft", "Half the pixels each way, one sample each: fastest"),
         (Quality::Normal, "normal", "Every pixel; four samples each at rest, one while anything moves"),
-        (Quality::Exact, "exact", "Four samples a pixel at every moment, as an export draws it: slowest"),
+        (
+            Quality::Exact,
+            "exact",
+            "Every pixel, four samples each, moving or not, as many as an export takes: slowest",
+        ),
     ] {
         ui.selectable_value(&mut quality, value, name).on_hover_text(help);
     }

@@ -14,7 +14,9 @@ impl Toasts {
     /// Show a notice; the same one again stays longer.
     pub fn push(&mut self, text: String, now: f64) {
         self.lines.retain(|(t, _)| *t != text);
-        self.lines.push((text, now + SECONDS));
+        // What is long takes longer to read.
+        let until = now + SECONDS + 0.04 * text.len() as f64;
+        self.lines.push((text, until));
         let over = self.lines.len().saturating_sub(MOST);
         self.lines.drain(..over);
     }

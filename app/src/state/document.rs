@@ -4,17 +4,8 @@ use sinew::asset::Asset;
 use sinew::clip::{Clip, Track};
 use sinew::pose::Pose;
 use sinew::skeleton::Skeleton;
-use sinew::time::{Range, Rate};
+use sinew::time::{ClipTimeline, Marker, Range, Rate, Timeline};
 use std::sync::Arc;
-
-/// A named moment.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Marker {
-    /// Seconds.
-    pub time: f64,
-    /// What people call it.
-    pub name: String,
-}
 
 /// A clip with its tracks shared.
 #[derive(Clone, Debug, PartialEq)]
@@ -89,6 +80,25 @@ impl Document {
     /// All clips as the library has them.
     pub fn to_clips(&self) -> Vec<Clip> {
         self.clips.iter().map(|c| c.to_clip()).collect()
+    }
+
+    /// What a file keeps beside the keys.
+    pub fn timeline(&self) -> Timeline {
+        let of = |c: &Arc<EditClip>| ClipTimeline {
+            range: Some(c.range),
+            preview: None,
+            markers: c.markers.clone(),
+        };
+        Timeline { rate: Some(self.rate), clips: self.clips.iter().map(of).collect() }
+    }
+
+    /// Take what a file kept beside the keys.
+    pub fn set_timeline(&mut self, timeline: &Timeline) {
+        self.rate = timeline.rate.unwrap_or(self.rate);
+        for (clip, of) in self.clips.iter_mut().zip(&timeline.clips) {
+            let clip = Arc::make_mut(clip);
+            (clip.range, clip.markers) = (of.range.unwrap_or(clip.range), of.markers.clone());
+        }
     }
 
     /// Equal to the last bit: what undo promises. Shared parts are not looked into.

@@ -1,10 +1,10 @@
 //! Edits: what changes the document. Each says what it is called, for the menu.
 
-use super::{EditClip, Marker, State};
+use super::{EditClip, State};
 use glam::{Quat, Vec3};
 use sinew::clip::{Clip, CurveError, Interpolation};
 use sinew::skeleton::BoneId;
-use sinew::time::{Range, Rate};
+use sinew::time::{Marker, Range, Rate};
 use std::sync::Arc;
 
 /// One channel of a bone, absolute.
@@ -61,6 +61,8 @@ pub enum Edit {
     SetInterpolation(Interpolation),
     /// Pose bones: keys at the playhead where keying is automatic, else loose.
     Pose(Vec<(BoneId, Change)>),
+    /// The weight of a shape, by its place in a pose: a key where keying is automatic, else loose.
+    Weight(usize, f32),
     /// The chosen bones' rotations at rest.
     ResetRotations,
     /// The pose put aside.
@@ -132,6 +134,7 @@ impl Edit {
             Self::PasteKeys => "Paste keys",
             Self::SetInterpolation(_) => "Interpolation",
             Self::Pose(_) => "Pose",
+            Self::Weight(..) => "Shape",
             Self::ResetRotations => "Reset rotations",
             Self::PastePose(Mirror::No) => "Paste pose",
             Self::PastePose(Mirror::ByName) => "Paste mirrored pose",
@@ -158,6 +161,7 @@ impl Edit {
             Self::PasteKeys => state.paste_keys(),
             Self::SetInterpolation(to) => state.set_interpolation(to),
             Self::Pose(changes) => state.apply_pose(&changes),
+            Self::Weight(i, weight) => state.set_weight(i, weight),
             Self::ResetRotations => state.reset_rotations(),
             Self::PastePose(mirror) => state.paste_pose(mirror),
             Self::SetMarker(marker) => state.set_marker(marker),
@@ -198,7 +202,7 @@ impl State {
     fn show_clip(&mut self, clip: usize) {
         self.clip = clip;
         self.selected().keys.clear();
-        self.loose.clear();
+        self.loosen_none();
         self.playback.range = self.active().range;
     }
 

@@ -8,7 +8,7 @@ pub mod playback;
 mod posing;
 pub mod selection;
 
-pub use document::{Document, EditClip, Marker};
+pub use document::{Document, EditClip};
 pub use edit::{Change, Edit, Mirror, Refused};
 pub use playback::{LoopMode, Playback};
 pub use posing::Loose;
@@ -18,6 +18,7 @@ use sinew::asset::Asset;
 use sinew::clip::Track;
 use sinew::pose::Pose;
 use sinew::skeleton::BoneId;
+use sinew::time::Timeline;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -29,7 +30,7 @@ pub enum Quality {
     /// Every pixel, smoothed edges when nothing moves.
     #[default]
     Normal,
-    /// Smoothed edges at every moment, as an export draws it.
+    /// Every pixel, smoothed edges at every moment.
     Exact,
 }
 
@@ -116,6 +117,8 @@ pub struct State {
     pub clipboard: Clipboard,
     /// Posed and not keyed; lost when the time changes.
     pub loose: BTreeMap<BoneId, Loose>,
+    /// Weights of shapes that are set and not keyed, by their place in a pose.
+    pub loose_weights: BTreeMap<usize, f32>,
     /// Grows with every change of the document, the pose or the selection.
     pub revision: u64,
     undo: Vec<Step>,
@@ -132,6 +135,7 @@ struct Step {
     clip: usize,
     selection: Arc<Selection>,
     loose: BTreeMap<BoneId, Loose>,
+    loose_weights: BTreeMap<usize, f32>,
 }
 
 /// Everything that can be asked of the state.
@@ -200,6 +204,7 @@ impl State {
             snap: true,
             clipboard: Clipboard::default(),
             loose: BTreeMap::new(),
+            loose_weights: BTreeMap::new(),
             revision: 0,
             undo: Vec::new(),
             redo: Vec::new(),
@@ -207,6 +212,23 @@ impl State {
         };
         state.time = state.playback.range.start;
         state
+    }
+
+    /// What a file keeps beside the keys, with what is previewed now.
+    pub fn timeline(&self) -> Timeline {
+        let mut timeline = self.document.timeline();
+        timeline.clips[self.clip].preview = Some(self.playback.range).filter(|r| *r != self.active().range);
+        timeline
+    }
+
+    /// Take what a file kept beside the keys; the clip that was previewed is shown.
+    pub fn set_timeline(&mut self, timeline: &Timeline) {
+        self.document.set_timeline(timeline);
+        let count = self.document.clips.len();
+        self.clip = timeline.clips.iter().take(count).position(|c| c.preview.is_some()).unwrap_or(self.clip);
+        let preview = timeline.clips.get(self.clip).and_then(|c| c.preview);
+        self.playback.range = preview.unwrap_or(self.active().range);
+        self.time = self.playback.range.start;
     }
 
     /// Do what is asked.
@@ -217,7 +239,7 @@ impl State {
         let time = self.time;
         let result = self.dispatch(command);
         if time.to_bits() != self.time.to_bits() && self.gesture.is_none() {
-            self.loose.clear();
+            self.loosen_none();
         }
         self.revision += 1;
         result
@@ -315,6 +337,9 @@ impl State {
         for (bone, loose) in &self.loose {
             pose.locals[bone.index()] = loose.local;
         }
+        for (&i, &weight) in &self.loose_weights {
+            pose.weights[i] = weight;
+        }
         pose
     }
 
@@ -340,15 +365,21 @@ impl State {
         self.commit();
         self.clip = clip;
         self.selected().keys.clear();
-        self.loose.clear();
+        self.loosen_none();
         self.playback.range = self.active().range;
         self.time = self.time.clamp(self.playback.range.start, self.playback.range.end);
         Ok(())
     }
 
     fn step(&self, name: &str) -> Step {
-        let (document, selection) = (self.document.clone(), self.selection.clone());
-        Step { name: name.into(), document, clip: self.clip, selection, loose: self.loose.clone() }
+        Step {
+            name: name.into(),
+            document: self.document.clone(),
+            clip: self.clip,
+            selection: self.selection.clone(),
+            loose: self.loose.clone(),
+            loose_weights: self.loose_weights.clone(),
+        }
     }
 
     fn restore(&mut self, step: Step) {
@@ -356,7 +387,7 @@ impl State {
         self.document = step.document;
         self.clip = step.clip;
         self.selection = step.selection;
-        self.loose = step.loose;
+        (self.loose, self.loose_weights) = (step.loose, step.loose_weights);
         if self.active().range != range {
             self.playback.range = self.active().range;
         }
@@ -364,7 +395,7 @@ impl State {
 
     /// One step back to `before`, if anything is different now.
     fn push_step(&mut self, before: Step) {
-        let posed = self.loose != before.loose;
+        let posed = self.loose != before.loose || self.loose_weights != before.loose_weights;
         if posed || !self.document.same_bits(&before.document) {
             self.undo.push(before);
             self.redo.clear();

@@ -68,6 +68,48 @@ impl State {
         out
     }
 
+    /// What was posed and not keyed is given up.
+    pub(super) fn loosen_none(&mut self) {
+        self.loose.clear();
+        self.loose_weights.clear();
+    }
+
+    /// Weights of shapes as they stand.
+    pub fn weights(&self) -> Vec<f32> {
+        let (skeleton, mut pose) = (self.document.skeleton(), self.document.asset.character.rest_pose());
+        let own = self.active().tracks.iter().filter(|t| matches!(t.target, Target::Weights { .. }));
+        own.for_each(|t| t.sample(skeleton, self.time, &mut pose));
+        self.loose_weights.iter().for_each(|(&i, &weight)| pose.weights[i] = weight);
+        pose.weights
+    }
+
+    pub(super) fn set_weight(&mut self, i: usize, weight: f32) -> Result<(), Refused> {
+        let count = self.document.asset.character.rest_pose().weights.len();
+        if i >= count || !weight.is_finite() {
+            return Err(Refused::Bad(format!("weight {weight} of shape {i} of {count}")));
+        }
+        self.loose_weights.insert(i, weight);
+        if self.auto_key {
+            self.selected().keys = Keys::new();
+            self.key_weights(false)?;
+        }
+        Ok(())
+    }
+
+    /// Key shapes as they stand: those that are loose and, if `all`, those that have keys.
+    fn key_weights(&mut self, all: bool) -> Result<(), Refused> {
+        let weights = self.weights();
+        for (first, width) in self.document.asset.character.weight_runs() {
+            let run = first..first + width;
+            let loose = self.loose_weights.range(run.clone()).next().is_some();
+            if loose || all {
+                self.key_channel(Target::Weights { first }, &weights[run.clone()], loose)?;
+            }
+            self.loose_weights.retain(|i, _| !run.contains(i));
+        }
+        Ok(())
+    }
+
     pub(super) fn apply_pose(&mut self, changes: &[(BoneId, Change)]) -> Result<(), Refused> {
         let count = self.document.skeleton().len();
         for (bone, change) in changes {
@@ -162,26 +204,18 @@ impl State {
     /// Keys at the playhead: of the selected bones, or of all tracks and everything loose where none is selected.
     pub(super) fn insert_keys(&mut self) -> Result<(), Refused> {
         if !self.selection.bones.is_empty() {
-            return self.key_bones(&self.selection.bones.clone(), &|fresh, _| fresh);
+            self.key_bones(&self.selection.bones.clone(), &|fresh, _| fresh)?;
+            return self.key_weights(false);
         }
         let tracked = self.active().tracks.iter().filter_map(|t| t.target.bone());
         let mut bones: Vec<BoneId> = tracked.chain(self.loose.keys().copied()).collect();
         bones.sort_unstable();
         bones.dedup();
-        if bones.is_empty() && self.active().tracks.is_empty() {
+        if bones.is_empty() && self.active().tracks.is_empty() && self.loose_weights.is_empty() {
             return Err(Refused::Bad("nothing is keyed yet; select the bones to key".into()));
         }
         self.key_bones(&bones, &|_, _| false)?;
-        let weights: Vec<usize> = (0..self.active().tracks.len())
-            .filter(|&t| matches!(self.active().tracks[t].target, Target::Weights { .. }))
-            .collect();
-        for track in weights {
-            let curve = &self.active().tracks[track].curve;
-            let mut value = vec![0.0; curve.width()];
-            curve.sample(self.time, &mut value);
-            self.key_track(track, &value)?;
-        }
-        Ok(())
+        self.key_weights(true)
     }
 
     /// Key bones as they stand. A channel without a track gets one if it is loose, or if `fresh(wanted, loose)` says so, where

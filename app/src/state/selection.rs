@@ -96,9 +96,6 @@ impl Spans {
     }
 }
 
-/// Every component of a key.
-pub const ALL: u8 = u8::MAX;
-
 /// Selected keys of one track.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TrackKeys {

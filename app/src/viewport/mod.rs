@@ -12,6 +12,7 @@ use egui::{Color32, PointerButton, Pos2, Rect, Sense, WidgetInfo, pos2};
 use gizmo::{Gizmo, Hold, Part};
 use glam::DVec3;
 use orbit::{Lens, Orbit};
+use picture::What;
 use sinew::fk::Posed;
 use sinew::skeleton::{BoneId, Skeleton};
 
@@ -28,8 +29,8 @@ pub struct Cost {
     pub vertices: usize,
     /// Triangles drawn.
     pub triangles: usize,
-    /// Pixels of the picture.
-    pub pixels: usize,
+    /// Pixels of the picture, across and down.
+    pub size: [usize; 2],
 }
 
 /// The viewport pane.
@@ -267,18 +268,27 @@ impl Viewport {
         painter.rect_filled(rect, 0.0, Color32::from_gray(42));
         overlay::ground(&painter, &lens);
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-        for (ghost, tint) in &self.picture.ghosts {
-            painter.image(ghost.id(), rect, whole, *tint);
-        }
         let xray = state.view.bones == BoneStyle::XRay;
-        let tint = if xray { Color32::from_white_alpha(90) } else { Color32::WHITE };
-        self.picture.body.iter().for_each(|t| {
-            painter.image(t.id(), rect, whole, tint);
-        });
-        let bones = if xray { Color32::WHITE } else { Color32::from_white_alpha(200) };
-        self.picture.bones.iter().for_each(|t| {
-            painter.image(t.id(), rect, whole, bones);
-        });
+        for layer in &self.picture.layers {
+            let share = match layer.what() {
+                What::Ghost(_, share) => *share,
+                What::Body => {
+                    if xray {
+                        90
+                    } else {
+                        255
+                    }
+                }
+                What::Bones(_) => {
+                    if xray {
+                        255
+                    } else {
+                        200
+                    }
+                }
+            };
+            painter.image(layer.texture.id(), rect, whole, Color32::from_white_alpha(share));
+        }
         if state.view.paths {
             self.paths.draw(&painter, &lens, state);
         }
@@ -290,7 +300,7 @@ impl Viewport {
             Some(Drag::Hold(_, part)) => Some(*part),
             _ => None,
         };
-        if let Some(g) = self.gizmo(state, &lens) {
+        if let Some(g) = self.gizmo(state, &lens).filter(|_| state.playback.playing.is_none()) {
             overlay::gizmo(&painter, &lens, &g, held);
             self.name_handles(ui, state, &lens, &g);
         }

@@ -31,13 +31,16 @@ pub fn ground(painter: &Painter, lens: &Lens) {
     let snapped = |v: f64| (v / step).round() * step;
     let (x, z) = (snapped(lens.orbit.target.x), snapped(lens.orbit.target.z));
     let faint = Stroke::new(1.0, Color32::from_gray(58));
-    for k in -10..=10 {
-        let (d, far) = (f64::from(k) * step, 10.0 * step);
-        // In parts, so that what is behind the eye is left out alone.
-        for part in -10..10 {
-            let (from, to) = (f64::from(part) * 0.1 * far, f64::from(part + 1) * 0.1 * far);
-            line(painter, lens, DVec3::new(x + d, 0.0, z + from), DVec3::new(x + d, 0.0, z + to), faint);
-            line(painter, lens, DVec3::new(x + from, 0.0, z + d), DVec3::new(x + to, 0.0, z + d), faint);
+    let far = 10.0 * step;
+    for d in (-10..=10).map(|k| f64::from(k) * step) {
+        let along_z = |t: f64| DVec3::new(x + d, 0.0, z + t);
+        let along_x = |t: f64| DVec3::new(x + t, 0.0, z + d);
+        for point in [&along_z as &dyn Fn(f64) -> DVec3, &along_x] {
+            let whole = [-far, far].map(|t| at(lens, point(t)));
+            // In parts where an end is behind the eye, so that what is there is left out alone.
+            let parts = if whole.iter().all(Option::is_some) { 1 } else { 20 };
+            let t = |i: i32| far * (2.0 * f64::from(i) / f64::from(parts) - 1.0);
+            (0..parts).for_each(|i| line(painter, lens, point(t(i)), point(t(i + 1)), faint));
         }
     }
 }

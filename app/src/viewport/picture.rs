@@ -9,10 +9,12 @@ use sinew::asset::Asset;
 use sinew::fk::Posed;
 use sinew::frames::{BonesDesc, Live, Look};
 use sinew::image::Rgba8;
+use sinew::pose::Pose;
 use sinew::render::Settings;
 use sinew::skeleton::BoneId;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// Ghosts of other moments, and how much of each is seen.
 const GHOSTS: [(i32, u8); 6] = [(-3, 50), (3, 50), (-2, 80), (2, 80), (-1, 120), (1, 120)];
@@ -24,24 +26,59 @@ const GHOST_STEP: f64 = 4.0;
 pub struct Picture {
     live: Option<(Arc<Asset>, Live)>,
     buffer: Rgba8,
-    /// Far ghosts first, with their tints.
-    pub ghosts: Vec<(TextureHandle, Color32)>,
-    /// The character.
-    pub body: Option<TextureHandle>,
-    /// Its bones.
-    pub bones: Option<TextureHandle>,
+    /// Far ghosts first, then the character, then its bones.
+    pub layers: Vec<Layer>,
     of: Option<Seen>,
     /// Pictures drawn since the start.
     pub drawn: u64,
 }
 
-/// All that a picture depends on; whatever else changes, it is not drawn again.
+/// A picture that lies over others, kept while what it shows is the same.
+pub struct Layer {
+    /// The picture.
+    pub texture: TextureHandle,
+    of: Shown,
+}
+
+impl Layer {
+    /// What is seen on it.
+    pub fn what(&self) -> &What {
+        &self.of.what
+    }
+}
+
+/// What is seen on a layer.
+#[derive(Clone, Debug, PartialEq)]
+pub enum What {
+    /// The character at another moment; how much of it is seen.
+    Ghost(i32, u8),
+    /// The character.
+    Body,
+    /// Its bones; those that are chosen.
+    Bones(Vec<BoneId>),
+}
+
+impl What {
+    fn is_like(&self, o: &Self) -> bool {
+        matches!((self, o), (Self::Body, Self::Body) | (Self::Bones(_), Self::Bones(_))) || self == o
+    }
+}
+
+#[derive(Clone, PartialEq)]
+struct Shown {
+    what: What,
+    pose: Pose,
+    orbit: Orbit,
+    settings: Settings,
+}
+
+/// All that the layers depend on; whatever else changes, nobody asks which are the same.
 #[derive(Clone)]
 struct Seen {
     clip: Arc<EditClip>,
     time: f64,
     frame: f64,
-    loose: BTreeMap<BoneId, Loose>,
+    loose: (BTreeMap<BoneId, Loose>, BTreeMap<usize, f32>),
     chosen: Vec<BoneId>,
     view: (Quality, BoneStyle, bool),
     orbit: Orbit,
@@ -56,7 +93,7 @@ impl Seen {
             clip: state.document.clips[state.clip].clone(),
             time: state.time,
             frame: state.frame_seconds(),
-            loose: state.loose.clone(),
+            loose: (state.loose.clone(), state.loose_weights.clone()),
             chosen: state.selection.bones.clone(),
             view: (v.quality, v.bones, v.onion),
             orbit: *orbit,
@@ -134,13 +171,15 @@ impl Picture {
             return None;
         }
         self.of = Some(now);
-        self.drawn += 1;
         let shrink = if quality == Quality::Draft { 2 } else { 1 };
         let [width, height] = size.map(|s| s.div_ceil(shrink).min(Settings::MAX_SIZE));
         let samples = if moving || quality == Quality::Draft { 1 } else { 4 };
         let threads = std::thread::available_parallelism().map_or(1, |n| n.get().min(8));
         let settings = Settings { width, height, samples, threads };
-        self.draw(ctx, state, orbit, &settings)
+        let cost = self.draw(ctx, state, orbit, &settings)?;
+        let drew = cost.draw_ms > 0.0;
+        self.drawn += u64::from(drew);
+        drew.then_some(cost)
     }
 
     fn draw(
@@ -150,63 +189,90 @@ impl Picture {
         orbit: &Orbit,
         settings: &Settings,
     ) -> Option<Cost> {
-        let Self { live, buffer, ghosts, body, bones, .. } = self;
+        let Self { live, buffer, layers, .. } = self;
         let (asset, live) = live.as_mut()?;
-        let camera = orbit.camera(live.center());
-        let mut cost = Cost { pixels: settings.width * settings.height, ..Cost::default() };
-        let take = |live: &mut Live, pose: &dyn Fn() -> sinew::pose::Pose, cost: &mut Cost| {
-            let start = std::time::Instant::now();
-            let pose = pose();
-            let sampled = start.elapsed();
-            let stats = live.pose(asset, &pose);
-            cost.evaluate_ms += ms(sampled + stats.times.pose);
-            cost.skin_ms += ms(stats.times.deform);
-            cost.vertices += stats.vertices;
-        };
-        let paint = |live: &mut Live, cost: &mut Cost, buffer: &mut Rgba8| {
-            let start = std::time::Instant::now();
-            let stats = live.draw(asset, &camera, [0.0; 4], settings, buffer);
-            cost.draw_ms += ms(start.elapsed());
-            cost.triangles += stats.drawn as usize;
-        };
-
-        let wanted = if state.view.onion { &GHOSTS[..] } else { &[] };
+        let cost = Cost { size: [settings.width, settings.height], ..Cost::default() };
+        let old = std::mem::take(layers);
+        let mut brush = Brush { ctx, asset, live, buffer, orbit, settings, old, cost };
         let step = GHOST_STEP * state.frame_seconds();
         let range = state.active().range;
-        let mut used = 0;
-        for (k, share) in wanted {
-            let t = state.time + f64::from(*k) * step;
-            if t < range.start - 1e-9 || t > range.end + 1e-9 {
-                continue;
+        for (k, share) in GHOSTS.into_iter().filter(|_| state.view.onion) {
+            let t = state.time + f64::from(k) * step;
+            if (range.start - 1e-9..=range.end + 1e-9).contains(&t) {
+                let pose = brush.evaluate(|| state.pose_at(t));
+                layers.push(brush.layer(pose, What::Ghost(k, share)));
             }
-            take(live, &|| state.pose_at(t), &mut cost);
-            paint(live, &mut cost, buffer);
+        }
+        let pose = brush.evaluate(|| state.pose());
+        layers.push(brush.layer(pose.clone(), What::Body));
+        if matches!(state.view.bones, BoneStyle::Pyramids | BoneStyle::XRay) {
+            layers.push(brush.layer(pose, What::Bones(state.selection.bones.clone())));
+        }
+        Some(brush.cost)
+    }
+}
+
+/// Draws the layers that changed.
+struct Brush<'a> {
+    ctx: &'a egui::Context,
+    asset: &'a Asset,
+    live: &'a mut Live,
+    buffer: &'a mut Rgba8,
+    orbit: &'a Orbit,
+    settings: &'a Settings,
+    old: Vec<Layer>,
+    cost: Cost,
+}
+
+impl Brush<'_> {
+    fn evaluate(&mut self, pose: impl FnOnce() -> Pose) -> Pose {
+        let start = Instant::now();
+        let pose = pose();
+        self.cost.evaluate_ms += ms(start.elapsed());
+        pose
+    }
+
+    /// A layer as it was, if it shows that; else drawn anew into its texture.
+    fn layer(&mut self, pose: Pose, what: What) -> Layer {
+        let of = Shown { what, pose, orbit: *self.orbit, settings: *self.settings };
+        let old = self.old.iter().position(|l| l.of.what.is_like(&of.what));
+        let old = old.map(|i| self.old.swap_remove(i));
+        let same = old.as_ref().is_some_and(|l| l.of == of);
+
+        // Whatever was drawn before, handles and bones stand where the character does.
+        if of.what == What::Body || !(same || matches!(of.what, What::Bones(_))) {
+            let stats = self.live.pose(self.asset, &of.pose);
+            self.cost.evaluate_ms += ms(stats.times.pose);
+            self.cost.skin_ms += ms(stats.times.deform);
+            self.cost.vertices += stats.vertices;
+        }
+        match old {
+            Some(layer) if same => layer,
+            old => {
+                self.draw(&of.what);
+                Layer { texture: upload(self.ctx, self.buffer, old.map(|l| l.texture)), of }
+            }
+        }
+    }
+
+    fn draw(&mut self, what: &What) {
+        let camera = self.orbit.camera(self.live.center());
+        let start = Instant::now();
+        let stats = match what {
+            What::Bones(chosen) => {
+                let desc = BonesDesc { selected: chosen.clone() };
+                self.live.draw_bones(self.asset, &desc, &camera, self.settings, self.buffer)
+            }
+            _ => self.live.draw(self.asset, &camera, [0.0; 4], self.settings, self.buffer),
+        };
+        self.cost.draw_ms += ms(start.elapsed());
+        self.cost.triangles += stats.drawn as usize;
+        if let What::Ghost(k, _) = what {
             let color = if *k < 0 { [70, 120, 255] } else { [255, 140, 40] };
-            for p in buffer.data.chunks_exact_mut(4) {
+            for p in self.buffer.data.chunks_exact_mut(4) {
                 (0..3).for_each(|c| p[c] = ((u16::from(p[c]) + 3 * color[c]) / 4) as u8);
             }
-            let tint = Color32::from_white_alpha(*share);
-            let mut slot = ghosts.get(used).map(|g| g.0.clone());
-            upload(ctx, "ghost", buffer, &mut slot);
-            ghosts.truncate(used);
-            ghosts.extend(slot.map(|s| (s, tint)));
-            used += 1;
         }
-        ghosts.truncate(used);
-
-        take(live, &|| state.pose(), &mut cost);
-        paint(live, &mut cost, buffer);
-        upload(ctx, "body", buffer, body);
-        if matches!(state.view.bones, BoneStyle::Pyramids | BoneStyle::XRay) {
-            let desc = BonesDesc { selected: state.selection.bones.clone() };
-            let start = std::time::Instant::now();
-            live.draw_bones(asset, &desc, &camera, settings, buffer);
-            cost.draw_ms += ms(start.elapsed());
-            upload(ctx, "bones", buffer, bones);
-        } else {
-            *bones = None;
-        }
-        Some(cost)
     }
 }
 
@@ -214,8 +280,8 @@ fn ms(of: std::time::Duration) -> f32 {
     of.as_secs_f32() * 1e3
 }
 
-/// Put a picture into a texture, premultiplied; most pixels are either there or not.
-fn upload(ctx: &egui::Context, name: &str, picture: &Rgba8, slot: &mut Option<TextureHandle>) {
+/// A picture as a texture, premultiplied; most pixels are either there or not.
+fn upload(ctx: &egui::Context, picture: &Rgba8, old: Option<TextureHandle>) -> TextureHandle {
     let pixel = |p: &[u8]| match p[3] {
         0 => Color32::TRANSPARENT,
         255 => Color32::from_rgb(p[0], p[1], p[2]),
@@ -223,8 +289,11 @@ fn upload(ctx: &egui::Context, name: &str, picture: &Rgba8, slot: &mut Option<Te
     };
     let pixels = picture.data.chunks_exact(4).map(pixel).collect();
     let image = ColorImage::new([picture.width, picture.height], pixels);
-    match slot {
-        Some(texture) => texture.set(image, TextureOptions::LINEAR),
-        None => *slot = Some(ctx.load_texture(name, image, TextureOptions::LINEAR)),
+    match old {
+        Some(mut texture) => {
+            texture.set(image, TextureOptions::LINEAR);
+            texture
+        }
+        None => ctx.load_texture("layer", image, TextureOptions::LINEAR),
     }
 }

@@ -50,6 +50,9 @@ pub(super) fn rig(
     let poses = rig_json::export_poses(&import.asset.character, &clips);
     say.warnings(input, &rig.warnings);
     say.warnings(input, &poses.warnings);
+    if import.timeline.clips.iter().any(|c| !c.markers.is_empty()) {
+        say.warn(&format!("{}: markers are left out, since bakes may change times", input.display()));
+    }
     let mut files = vec![];
     for (name, texture) in names.iter().zip(&import.asset.textures) {
         if rig.document.materials.iter().any(|m| m.texture.as_ref() == Some(name)) {

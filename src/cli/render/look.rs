@@ -63,9 +63,6 @@ struct Background {
     bottom: Option<[f32; 4]>,
 }
 
-/// Before what characters stand if nothing else is said: #e8eaed.
-const PAPER: u32 = 0xe8eaed;
-
 impl LookArgs {
     /// Whether a background was asked for.
     pub fn has_background(&self) -> bool {
@@ -152,7 +149,7 @@ impl LookArgs {
 
     fn background_of(&self, file: &LookFile) -> Background {
         let of_file = file.background.map(|[top, b]| Background { top, bottom: (b != top).then_some(b) });
-        self.background.or(of_file).unwrap_or(Background { top: opaque(PAPER), bottom: None })
+        self.background.or(of_file).unwrap_or(Background { top: Look::paper(), bottom: None })
     }
 }
 

@@ -12,10 +12,11 @@ use super::film::Job;
 use super::time::Frame;
 use crate::cli::{Failure, say::Say};
 use sinew::asset::Asset;
-use sinew::frames::{Pivot as Axis, Shot, ShotDesc, Turns, View, ground_point};
+use sinew::frames::{Shot, ShotDesc, View};
 use sinew::io::picture::{Format, Target};
 use sinew::io::sheet_json::Style;
 use sinew::render::Settings;
+use sinew::sheet::{Kind, SheetDesc};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -60,13 +61,6 @@ pub struct SheetArgs {
     pub pixels: PixelArgs,
 }
 
-/// How frames lie.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    Grid,
-    Trimmed,
-}
-
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Pivot {
     Auto,
@@ -107,11 +101,7 @@ impl SheetArgs {
         if self.sheet.is_some() || self.pixels.is_on() {
             (desc.look.background, desc.look.background_bottom) = ([0.0; 4], None);
         }
-        if self.directions > 1 && desc.framing.turns == Turns::None {
-            desc.framing.turns = Turns::Each(self.directions.into());
-            desc.framing.pivot = Axis::At(ground_point(asset, desc.clip));
-        }
-        desc
+        desc.from_sides(asset, self.directions.into())
     }
 
     /// Whether the result is transparent whatever the background is.
@@ -158,9 +148,19 @@ impl SheetArgs {
             return Err(Failure::Run(message));
         }
         match (self.sheet, self.contact) {
-            (Some(kind), _) => sprites::write(self, kind, job, clip, path, say),
+            (Some(kind), _) => sprites::write(self, self.sheet_desc(kind), job, clip, path, say),
             (None, Some(cells)) => contact::write(cells, job, path, say),
             (None, None) => Ok(()),
+        }
+    }
+
+    fn sheet_desc(&self, kind: Kind) -> SheetDesc {
+        SheetDesc {
+            kind,
+            columns: self.columns.map(usize::from),
+            padding: self.padding.map(usize::from),
+            extrude: self.extrude.into(),
+            power_of_two: self.power_of_two,
         }
     }
 

@@ -105,7 +105,6 @@ fn assemble(doc: &Document, base: Option<&Path>, options: &Options, mut w: Warni
     extensions.sort();
     extensions.dedup();
     Ok(Import {
-        setting: None,
         asset: Asset { character, materials: looks.materials, textures: looks.textures, cameras, lights },
         format: "glTF".into(),
         generator: doc.root.asset.generator.clone().unwrap_or_default(),
@@ -113,5 +112,6 @@ fn assemble(doc: &Document, base: Option<&Path>, options: &Options, mut w: Warni
         primitives: geometry.sources,
         extensions,
         warnings: w.finish(),
+        ..Import::default()
     })
 }

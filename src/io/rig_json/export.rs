@@ -60,7 +60,7 @@ pub fn export_poses(character: &Character, clips: &[clip::Clip]) -> Exported<Pos
     let names = unique_names(character.skeleton(), &mut warnings);
     let runs = character.weight_runs();
     let clips = clips.iter().map(|c| one_clip(c, &names, &runs, &mut warnings)).collect();
-    Exported { document: Poses { sinew_poses: 1, clips }, warnings }
+    Exported { document: Poses { sinew_poses: 1, clips, ..Poses::default() }, warnings }
 }
 
 fn warn(warnings: &mut Vec<Warning>, place: impl Into<String>, message: impl Into<String>) {

@@ -71,7 +71,9 @@ fn mesh(out: &mut String, m: &Mesh) {
 
 /// A file of poses.
 pub fn poses(poses: &Poses) -> String {
-    let mut out = format!("{{\n  \"sinew_poses\": {},\n  \"clips\": [", poses.sinew_poses);
+    let mut out = format!("{{\n  \"sinew_poses\": {}", poses.sinew_poses);
+    field(&mut out, 2, "rate", &poses.rate);
+    out.push_str(",\n  \"clips\": [");
     for (i, c) in poses.clips.iter().enumerate() {
         out.push_str(if i == 0 { "\n" } else { ",\n" });
         clip(&mut out, c);
@@ -87,6 +89,9 @@ fn clip(out: &mut String, c: &Clip) {
     }
     let _ = write!(out, ",\n      \"interpolation\": {}", json(&c.interpolation));
     let _ = write!(out, ",\n      \"tangents\": {}", json(&c.tangents));
+    field(out, 6, "range", &c.range);
+    field(out, 6, "preview", &c.preview);
+    field(out, 6, "markers", &Some(&c.markers).filter(|m| !m.is_empty()));
     out.push_str(",\n      \"tracks\": [");
     for (i, t) in c.tracks.iter().enumerate() {
         out.push_str(if i == 0 { "\n" } else { ",\n" });
@@ -114,6 +119,13 @@ fn track(out: &mut String, t: &Track) {
         out.push(']');
     }
     out.push('}');
+}
+
+/// A field on a line of its own, if it is there.
+fn field<T: Serialize>(out: &mut String, indent: usize, key: &str, value: &Option<T>) {
+    if let Some(value) = value {
+        let _ = write!(out, ",\n{:indent$}\"{key}\": {}", "", json(value));
+    }
 }
 
 /// A field whose items stand on a line each.

@@ -25,6 +25,7 @@ use crate::clip;
 use crate::fk;
 use crate::io::{Import, Options, read_below, read_file};
 use crate::pose::Pose;
+use crate::time::Timeline;
 use std::path::Path;
 
 /// Fetches a file that a rig names, by its path relative to the rig, without `.` and needless `..`.
@@ -147,22 +148,30 @@ impl Rig {
             instances.push(instance);
         }
         let character = Character::new(skeleton, all, instances, runs.rest, Vec::new())?;
-        let clips = self.fetch_poses(&character, fetch)?;
+        let (clips, timeline) = self.fetch_poses(&character, fetch)?;
         let character = character.with_clips(clips)?;
         let asset = Asset { character, materials, textures: textures.list, ..Default::default() };
-        Ok(Import { asset, format: "sinew rig".into(), warnings, ..Default::default() })
+        Ok(Import { asset, format: "sinew rig".into(), timeline, warnings, ..Default::default() })
     }
 
-    fn fetch_poses(&self, character: &Character, fetch: Fetch) -> Result<Vec<clip::Clip>, RigError> {
-        let mut clips = Vec::new();
+    fn fetch_poses(
+        &self,
+        character: &Character,
+        fetch: Fetch,
+    ) -> Result<(Vec<clip::Clip>, Timeline), RigError> {
+        let (mut clips, mut timeline) = (Vec::new(), Timeline::default());
         for file in self.poses.iter().flatten() {
             let path = inside_project(file)?;
             let read = |source| RigError::Read { file: file.clone(), source };
             let bytes = fetch(&path).map_err(read)?;
             let inside = |error| RigError::In { file: file.into(), error: Box::new(error) };
-            clips.extend(poses_from_bytes(&bytes, character).map_err(inside)?);
+            let poses = Poses::from_bytes(&bytes).map_err(inside)?;
+            clips.extend(poses.to_clips(character).map_err(inside)?);
+            let own = poses.timeline().map_err(inside)?;
+            timeline.rate = timeline.rate.or(own.rate);
+            timeline.clips.extend(own.clips);
         }
-        Ok(clips)
+        Ok((clips, timeline))
     }
 }
 

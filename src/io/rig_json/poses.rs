@@ -6,15 +6,19 @@ use crate::character::Character;
 use crate::clip::{self, Curve, Target};
 use crate::math::{euler, rotation, spline};
 use crate::skeleton::{BoneId, Skeleton};
+use crate::time::{ClipTimeline, Marker, Range, Rate, Timeline};
 use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
 /// A whole file of poses.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Poses {
     /// Version of the format: 1.
     pub sinew_poses: u32,
+    /// Frames in so many seconds that keys were set by, for editors: `[24, 1]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rate: Option<[u16; 2]>,
     /// In the order in which they are listed and chosen.
     pub clips: Vec<Clip>,
 }
@@ -34,6 +38,15 @@ pub struct Clip {
     /// The slopes of Catmull-Rom keys, unless a track says otherwise.
     #[serde(default)]
     pub tangents: Tangents,
+    /// First and last second of what an editor plays, where that is not from the first key to the last.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub range: Option<[f64; 2]>,
+    /// The part of it that somebody was looking at.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub preview: Option<[f64; 2]>,
+    /// Named moments: rows of a second and a name, ascending.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub markers: Vec<(f64, String)>,
     /// What moves.
     pub tracks: Vec<Track>,
 }
@@ -140,6 +153,47 @@ impl Poses {
     pub fn to_clips(&self, character: &Character) -> Result<Vec<clip::Clip>, RigError> {
         let runs = character.weight_runs();
         self.clips.iter().map(|c| one_clip(c, character.skeleton(), &runs)).collect()
+    }
+
+    /// Rate, ranges and markers.
+    ///
+    /// # Errors
+    /// [`RigError::Value`]: a rate of zero, a range that ends before it starts, markers out of order.
+    pub fn timeline(&self) -> Result<Timeline, RigError> {
+        let rate = self.rate.map(|[frames, seconds]| Rate::new(frames, seconds)).transpose();
+        let rate = rate.map_err(|e| RigError::value("rate", e.to_string()))?;
+        Ok(Timeline { rate, clips: self.clips.iter().map(Clip::timeline).collect::<Result<_, _>>()? })
+    }
+
+    /// The same clips with rate, ranges and markers.
+    pub fn with_timeline(mut self, timeline: &Timeline) -> Self {
+        let ends = |r: Range| [r.start, r.end];
+        self.rate = timeline.rate.map(|r| [r.frames(), r.seconds()]);
+        for (clip, of) in self.clips.iter_mut().zip(&timeline.clips) {
+            (clip.range, clip.preview) = (of.range.map(ends), of.preview.map(ends));
+            clip.markers = of.markers.iter().map(|m| (m.time, m.name.clone())).collect();
+        }
+        self
+    }
+}
+
+impl Clip {
+    fn timeline(&self) -> Result<ClipTimeline, RigError> {
+        let bad = |why| RigError::value(format!("clip `{}`", self.name), why);
+        let range = |what: &str, ends: Option<[f64; 2]>| match ends {
+            Some([start, end]) if start > end => {
+                Err(bad(format!("its {what} ends at {end} s, before it starts at {start} s")))
+            }
+            ends => Ok(ends.map(|[start, end]| Range { start, end })),
+        };
+        if let Some([(before, _), (time, name)]) = self.markers.windows(2).find(|w| w[0].0 >= w[1].0) {
+            let why =
+                format!("marker `{name}` at {time} s follows one at {before} s; expected them in order");
+            return Err(bad(why));
+        }
+        let markers = self.markers.iter().map(|(time, name)| Marker { time: *time, name: name.clone() });
+        let [range, preview] = [range("range", self.range)?, range("preview", self.preview)?];
+        Ok(ClipTimeline { range, preview, markers: markers.collect() })
     }
 }
 

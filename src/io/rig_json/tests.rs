@@ -310,3 +310,27 @@ fn neither_links_out_of_the_project_nor_pipes_are_read() {
     assert!(out.contains("cannot read `out.json`: it is a link to "), "{out}");
     assert!(pipe.contains("cannot read `pipe.json`: this is a pipe"), "{pipe}");
 }
+
+#[test]
+fn rates_ranges_and_markers_come_back_and_wrong_ones_are_refused() {
+    let text = r#"{"sinew_poses": 1, "rate": [30000, 1001], "clips": [{"name": "nod", "range": [0, 2], "preview": [0.5, 1],
+        "markers": [[0.25, "up"], [1, "\"down\""]], "tracks": []}]}"#;
+    let poses = Poses::from_bytes(text.as_bytes()).unwrap();
+    let timeline = poses.timeline().unwrap();
+    assert_eq!(timeline.rate.unwrap().to_string(), "30000/1001");
+    assert_eq!((timeline.clips[0].markers[1].time, &*timeline.clips[0].markers[1].name), (1.0, "\"down\""));
+    let bare = Clip { name: "nod".into(), ..Clip::default() };
+    let again = Poses { sinew_poses: 1, rate: None, clips: vec![bare] }.with_timeline(&timeline);
+    assert_eq!(Poses::from_bytes(again.to_text().as_bytes()).unwrap(), poses);
+    for (from, to, why) in [
+        ("[30000, 1001]", "[0, 1]", "rate: "),
+        ("[0, 2]", "[3, 2]", "clip `nod`: its range ends at 2 s, before it starts at 3 s"),
+        ("[0.5, 1]", "[0.5, 0]", "clip `nod`: its preview ends"),
+        ("[0.25, ", "[1.5, ", "clip `nod`: marker `\"down\"` at 1 s follows one at 1.5 s"),
+        ("[0, 2]", "[0]", "line 1"),
+    ] {
+        let bad = Poses::from_bytes(text.replace(from, to).as_bytes()).and_then(|p| p.timeline());
+        let found = bad.unwrap_err().to_string();
+        assert!(found.starts_with(why), "{found}");
+    }
+}

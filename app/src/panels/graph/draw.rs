@@ -26,11 +26,7 @@ pub(super) fn curve(painter: &egui::Painter, axis: &Axis, values: &Values, c: &C
         }
         points.push(pos2(rect.right(), values.y(last)));
     } else {
-        let mut x = rect.left();
-        while x <= rect.right() + 2.0 {
-            points.push(pos2(x, values.y(c.at(axis.t(x)))));
-            x += 2.0;
-        }
+        points = c.points(axis, values);
     }
     painter.add(egui::Shape::line(points, stroke));
 }

@@ -11,7 +11,7 @@ use super::parts::{Names, menu};
 use crate::Bus;
 use crate::commands::Task;
 use crate::state::{Command, Keys, Mode, Spans, State, TrackKeys};
-use channel::{Channel, Values, channels, extent, nearest};
+use channel::{Channel, Looks, Values, channels, nearest};
 use draw::{curve, legend, levels, tangent};
 use egui::{Align2, Color32, FontId, PointerButton, Pos2, Rect, Sense, Vec2, pos2};
 
@@ -25,6 +25,7 @@ pub struct Graph {
     last_fit: Option<(f64, f64)>,
     grip: Grip,
     last_time: f64,
+    looks: Looks,
     /// What a command asked for, to be done when the pane is drawn next.
     pub pending: Option<Task>,
 }
@@ -35,8 +36,8 @@ impl Graph {
         let pane = ui.max_rect();
         let rect = Rect::from_min_max(pane.min + Vec2::new(LABELS, RULER), pane.max);
         let axis = Axis::new(&state.view, rect);
-        let channels = channels(state, &axis);
-        let (low, high) = self.range(&channels, &axis);
+        let channels = channels(state, &axis, &mut self.looks);
+        let (low, high) = self.range(&channels);
         let values = Values { rect, low, high };
 
         let sense = ui.interact(pane, ui.scope_id().with("graph"), Sense::click_and_drag());
@@ -57,7 +58,7 @@ impl Graph {
     }
 
     /// Bottom and top: what somebody chose, or what is there; while keys are dragged it stays.
-    fn range(&mut self, channels: &[Channel<'_>], axis: &Axis) -> (f64, f64) {
+    fn range(&mut self, channels: &[Channel<'_>]) -> (f64, f64) {
         if let Some(held) = self.held {
             return held;
         }
@@ -66,7 +67,7 @@ impl Graph {
         }
         let mut ends: Option<(f64, f64)> = None;
         for c in channels {
-            let (a, b) = extent(c, axis);
+            let (a, b) = c.extent();
             ends = Some(ends.map_or((a, b), |(lo, hi)| (lo.min(a), hi.max(b))));
         }
         let (lo, hi) = ends.unwrap_or((-1.0, 1.0));
@@ -141,10 +142,17 @@ impl Graph {
         }
         let shift = ui.input(|i| i.modifiers.shift || i.modifiers.command);
         let pressed = ui.input(|i| i.pointer.button_pressed(PointerButton::Primary));
-        if !(pressed && sense.is_pointer_button_down_on() && axis.rect.contains(at)) {
+        // A tap is pressed and released within one frame.
+        let tapped = pressed && sense.clicked();
+        let down = pressed && sense.is_pointer_button_down_on();
+        if !((down || tapped) && axis.rect.contains(at)) {
             return;
         }
+        let mode = if shift { Mode::Add } else { Mode::Replace };
         let Some((channel, k)) = nearest(channels, axis, values, at) else {
+            if tapped {
+                return bus.send(Command::SelectKeys(Keys::new(), mode));
+            }
             self.grip.drag = Drag::Box { from: here };
             return;
         };
@@ -155,8 +163,11 @@ impl Graph {
         let chosen = state.selection.keys.get(&(channel.track as u32));
         let selected = chosen.is_some_and(|s| s.spans.contains(k) && s.mask & channel.bit() != 0);
         let click = Some(keys.clone()).filter(|_| selected && !shift);
-        if click.is_none() {
-            bus.send(Command::SelectKeys(keys, if shift { Mode::Add } else { Mode::Replace }));
+        if tapped || click.is_none() {
+            bus.send(Command::SelectKeys(keys, mode));
+        }
+        if tapped {
+            return;
         }
         self.grip.take(here, channel.stored_unit(), bus);
         self.grip.click = click;
@@ -205,7 +216,7 @@ impl Graph {
         axis::grid(&inner, axis, state, ui.visuals());
         levels(&painter, values, ui.visuals());
         let mut mesh = egui::Mesh::default();
-        let mut names = Names(ui);
+        let mut names = Names::of(ui, "graph");
         // Slopes of many keys would hide the curves.
         let few = state.selection.key_count() <= 24;
         for c in channels {
@@ -215,7 +226,7 @@ impl Graph {
 
             // Keys too close to be taken one by one are left to the curve.
             let crowded = seen.len() as f32 > axis.rect.width() / 4.0;
-            for k in seen.filter(|_| !crowded) {
+            for k in if crowded { 0..0 } else { seen } {
                 let (t, v) = c.key(k);
                 let at = pos2(axis.x(t), values.y(v));
                 let on = chosen.is_some_and(|s| s.spans.contains(k));
@@ -238,7 +249,10 @@ impl Graph {
         } else if let Some(hint) = singular(state) {
             inner.text(below, Align2::RIGHT_BOTTOM, hint, font, Color32::from_rgb(240, 200, 120));
         } else if channels.is_empty() {
-            let text = "Select bones, or keys in the dope sheet, to see their curves";
+            let text = match state.selection.bones.is_empty() {
+                true => "Select bones, or keys in the dope sheet, to see their curves",
+                false => "The selected bones have no keys yet: I sets some",
+            };
             inner.text(axis.rect.center(), Align2::CENTER_CENTER, text, font, ui.visuals().weak_text_color());
         }
     }

@@ -23,7 +23,7 @@ pub fn files(name: &str, title: &str, bones: &bones::Bones, look: Look, clips: V
         materials: look.materials,
         meshes: look.meshes,
     };
-    let poses = Poses { sinew_poses: 1, clips };
+    let poses = Poses { sinew_poses: 1, clips, ..Poses::default() };
     vec![
         File { path: format!("rigs/{name}.json"), bytes: rig.to_text().into_bytes() },
         File { path: format!("poses/{name}.json"), bytes: poses.to_text().into_bytes() },

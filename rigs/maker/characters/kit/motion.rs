@@ -138,6 +138,7 @@ pub fn clip<'a>(
         interpolation: Interpolation::CatmullRom,
         tangents: Tangents::Notes,
         tracks,
+        ..Clip::default()
     }
 }
 

@@ -2,13 +2,13 @@
 
 use super::super::channels::{depth_code, distinct_color, normal_code};
 use super::super::time::Frame;
-use super::sprites::{Placed, Plan, file_name};
+use super::sprites::{Drawn, Plan, file_name};
 use super::{MapName, Painter, SheetArgs, draw};
 use crate::cli::{Failure, say::Say};
 use sinew::frames::Worker;
 use sinew::io::picture::{self, Data, encode_data_png};
 use sinew::render::channel::{Channel, Channels};
-use sinew::sheet::{Canvas, Layout, Map, MapKind, Rect};
+use sinew::sheet::{Canvas, Layout, Map, MapKind, Placed, Rect};
 use std::path::{Path, PathBuf};
 
 /// Objects that an 8-bit index can number.
@@ -30,7 +30,7 @@ type Files = Vec<(PathBuf, Vec<u8>)>;
 pub fn draw(
     args: &SheetArgs,
     plan: &Plan,
-    placed: &Placed,
+    drawn: &Drawn,
     path: &Path,
     say: &Say,
 ) -> Result<(Vec<Map>, Files), Failure> {
@@ -43,14 +43,14 @@ pub fn draw(
         let n = names.len();
         return Err(Failure::Run(format!("--maps id: {n} objects; expected at most {MOST_OBJECTS}")));
     }
-    let canvases = fill(args, plan, placed, &wanted, say)?;
+    let canvases = fill(args, plan, &drawn.placed, &wanted, say)?;
     let (mut maps, mut files) = (Vec::new(), Vec::new());
     for name in wanted {
         let file = path.with_extension(format!("{}.png", name.name()));
         let (kind, bytes) = match name {
-            MapName::Normal => normals(&canvases, placed, plan),
-            MapName::Depth => depth(&canvases, placed, plan),
-            MapName::Id => objects(&canvases, placed, plan, &names),
+            MapName::Normal => normals(&canvases, drawn, plan),
+            MapName::Depth => depth(&canvases, drawn, plan),
+            MapName::Id => objects(&canvases, drawn, plan, &names),
         };
         let bytes = bytes.map_err(|e: picture::Error| Failure::Run(e.to_string()))?;
         maps.push(Map { image: file_name(&file), kind });
@@ -90,7 +90,7 @@ fn fill(
         out
     };
     draw::frames(plan.job, &frames, say, one, |i, seen| {
-        let (place, trim, extrude) = (places[i], placed.cuts[chosen[i]].1, plan.margins.extrude);
+        let (place, trim, extrude) = (places[i], placed.cuts[chosen[i]].1, placed.extrude);
         let at = |trim: Rect| indices(trim, seen.width, scale);
         to.objects.put(place, &at(trim).map(|k| seen.objects[k]).collect::<Vec<_>>(), extrude);
         if let Some(depth) = &mut to.depth {
@@ -130,16 +130,16 @@ fn grow(seen: &mut Channels) {
 
 type Made = (MapKind, Result<Vec<u8>, picture::Error>);
 
-fn normals(from: &Canvases, placed: &Placed, plan: &Plan) -> Made {
+fn normals(from: &Canvases, drawn: &Drawn, plan: &Plan) -> Made {
     let normals = from.normals.iter().flat_map(|c| &c.pixels);
     let pixel = |([x, y, z], a): (&[u8; 3], &u8)| [*x, *y, *z, *a];
-    let pixels: Vec<[u8; 4]> = normals.zip(&placed.alpha).map(pixel).collect();
-    (MapKind::Normal, encode_data_png(placed.layout.size, Data::Rgba8(&pixels), plan.job.level, ""))
+    let pixels: Vec<[u8; 4]> = normals.zip(&drawn.alpha).map(pixel).collect();
+    (MapKind::Normal, encode_data_png(drawn.placed.layout.size, Data::Rgba8(&pixels), plan.job.level, ""))
 }
 
-fn depth(from: &Canvases, placed: &Placed, plan: &Plan) -> Made {
+fn depth(from: &Canvases, drawn: &Drawn, plan: &Plan) -> Made {
     let depth = || from.depth.iter().flat_map(|c| &c.pixels);
-    let there = || depth().zip(&placed.alpha).filter(|(d, a)| d.is_finite() && **a > 0).map(|p| *p.0);
+    let there = || depth().zip(&drawn.alpha).filter(|(d, a)| d.is_finite() && **a > 0).map(|p| *p.0);
     let near = there().reduce(f32::min).unwrap_or(0.0);
     let far = there().reduce(f32::max).unwrap_or(1.0);
     // A flat picture still needs a range.
@@ -147,18 +147,19 @@ fn depth(from: &Canvases, placed: &Placed, plan: &Plan) -> Made {
     let code = |(d, a): (&f32, &u8)| {
         if *a == 0 { 0 } else { depth_code(*d, [near, far]) }
     };
-    let pixels: Vec<u16> = depth().zip(&placed.alpha).map(code).collect();
-    let bytes = encode_data_png(placed.layout.size, Data::Gray16(&pixels), plan.job.level, "");
+    let pixels: Vec<u16> = depth().zip(&drawn.alpha).map(code).collect();
+    let bytes = encode_data_png(drawn.placed.layout.size, Data::Gray16(&pixels), plan.job.level, "");
     (MapKind::Depth { near, far }, bytes)
 }
 
-fn objects(from: &Canvases, placed: &Placed, plan: &Plan, names: &[String]) -> Made {
+fn objects(from: &Canvases, drawn: &Drawn, plan: &Plan, names: &[String]) -> Made {
     let objects: Vec<(String, [u8; 3])> =
         names.iter().enumerate().map(|(i, n)| (n.clone(), distinct_color(i))).collect();
     let mut colors = vec![[0; 3]];
     colors.extend(objects.iter().map(|o| o.1));
     let code = |(o, a): (&u32, &u8)| if *a > 0 { *o as u8 } else { 0 };
-    let indices: Vec<u8> = from.objects.pixels.iter().zip(&placed.alpha).map(code).collect();
-    let bytes = encode_data_png(placed.layout.size, Data::Index8(&indices, &colors), plan.job.level, "");
+    let indices: Vec<u8> = from.objects.pixels.iter().zip(&drawn.alpha).map(code).collect();
+    let bytes =
+        encode_data_png(drawn.placed.layout.size, Data::Index8(&indices, &colors), plan.job.level, "");
     (MapKind::Object { objects }, bytes)
 }
