@@ -201,6 +201,11 @@ fn desc(args: &Args, import: &Import) -> Result<(BakeDesc, f64), Failure> {
     let vertices = character.instances().iter().map(|i| character.mesh(i).positions.len()).sum::<usize>();
     let tolerance = match args.tolerance {
         Tolerance::Metres(m) => m,
+        Tolerance::OfDiagonal(_) if diagonal == 0.0 => {
+            let message =
+                "nothing in it has an extent that a percentage could be of; give a length: --tolerance 1mm";
+            return Err(Failure::Usage(message.into()));
+        }
         Tolerance::OfDiagonal(part) => part * diagonal,
     };
     let desc = BakeDesc {
@@ -237,11 +242,11 @@ fn one(
 ) -> Result<(), Failure> {
     let chosen = clip.map_or_else(|| chosen(args, input, import), |c| Ok(vec![c]))?;
     let form = args.to.form(output)?;
-    let (desc, diagonal) = desc(args, import)?;
     let placed = |f: Failure| {
         let message = format!("{}: {}", input.display(), f.message());
         f.with_message(message)
     };
+    let (desc, diagonal) = desc(args, import).map_err(placed)?;
     let beyond = write::beyond(args, input, import)?;
     let edited = clips::edited(&args.edits, import, &chosen, &beyond, &desc, say).map_err(placed)?;
     let limited = args.forms.limited(import, &edited, say);

@@ -15,11 +15,9 @@ pub fn vertices_of(import: &Import, other: &Import) -> Option<Character> {
     let bone_of: BTreeMap<u32, BoneId> =
         import.nodes.iter().zip(c.skeleton().ids()).map(|(n, b)| (*n, b)).collect();
     let node = |b: BoneId| other.nodes[b.index()];
+    let now: BTreeMap<u32, BoneId> = from.skeleton().ids().map(|b| (node(b), b)).collect();
     // The node that carried a mesh before, if that was another.
-    let carrier = |node_now: u32| -> Option<u32> {
-        let now = from.skeleton().ids().find(|b| node(*b) == node_now)?;
-        from.skeleton().parent(now).map(node)
-    };
+    let carrier = |of: u32| from.skeleton().parent(*now.get(&of)?).map(node);
     let mut found: BTreeMap<(u32, u32, u32), usize> = BTreeMap::new();
     for (i, p) in other.primitives.iter().enumerate() {
         let known = (p.node as usize) < import.nodes.len();

@@ -65,13 +65,11 @@ impl Rewritten {
         let doc = Document::new(root, Some(&bin), None, &mut w)?;
         let form = |group: usize| forms.get(&group).copied().unwrap_or_default();
         let mut work = Work { doc: &doc, json: &mut self.json, pool: Pool::default(), quantized: false };
-        let mut grids = BTreeMap::new();
-        for group in groups.iter().copied().filter(|&g| form(g).positions) {
-            if !grids.contains_key(&group) {
-                grids.insert(group, groups::grid(work.json, &doc, &groups, group)?);
-            }
-        }
-        let grid = |mesh: usize| grids.get(&groups[mesh]).copied().flatten().map(|g| (groups[mesh], g));
+        let grids = groups::grids(work.json, &doc, &groups)?;
+        let grid = |mesh: usize| {
+            let group = *groups.get(mesh)?;
+            grids[group].filter(|_| form(group).positions).map(|grid| (group, grid))
+        };
         for mesh in 0..groups.len() {
             for p in 0..work.json["meshes"][mesh]["primitives"].as_array().map_or(0, Vec::len) {
                 let mut primitive = work.json["meshes"][mesh]["primitives"][p].take();
@@ -234,7 +232,7 @@ impl Work<'_> {
 
     /// Undo the grids where meshes are shown.
     fn nodes(&mut self, grid: &impl Fn(usize) -> Option<(usize, Grid)>) -> Result<()> {
-        let mut skins = BTreeMap::new();
+        let (mut skins, mut moved) = (BTreeMap::new(), BTreeMap::new());
         for n in 0..list(self.json, "nodes").len() {
             let node = &mut self.json["nodes"][n];
             let Some((_, grid)) = node["mesh"].as_u64().and_then(|m| grid(m as usize)) else { continue };
@@ -254,8 +252,9 @@ impl Work<'_> {
             let child = nodes.len();
             nodes.push(own);
             super::write::adopt(&mut nodes[n], child);
-            self.follow(n, child);
+            moved.insert(n as u64, child);
         }
+        self.follow(&moved);
         for (skin, grid) in skins {
             self.skin(skin, grid)?;
         }
@@ -263,25 +262,23 @@ impl Work<'_> {
     }
 
     /// What moves the morph weights of a node moves those of its child.
-    fn follow(&mut self, node: usize, child: usize) {
-        let old = format!("/nodes/{node}/weights");
+    fn follow(&mut self, moved: &BTreeMap<u64, usize>) {
         for animation in list(self.json, "animations") {
-            for target in animation
-                .get_mut("channels")
-                .and_then(Value::as_array_mut)
-                .into_iter()
-                .flatten()
-                .filter_map(|c| c.get_mut("target"))
-            {
-                if target["path"] == "weights" && target["node"] == node {
-                    target["node"] = child.into();
+            let channels = animation.get_mut("channels").and_then(Value::as_array_mut).into_iter().flatten();
+            for target in channels.filter_map(|c| c.get_mut("target")) {
+                let node = target["node"].as_u64().filter(|_| target["path"] == "weights");
+                if let Some(child) = node.and_then(|n| moved.get(&n)) {
+                    target["node"] = (*child).into();
                 }
                 let Some(pointer) = target.pointer_mut("/extensions/KHR_animation_pointer/pointer") else {
                     continue;
                 };
-                let rest = pointer.as_str().and_then(|p| p.strip_prefix(&old)).map(str::to_owned);
-                if let Some(rest) = rest.filter(|r| r.is_empty() || r.starts_with('/')) {
-                    *pointer = format!("/nodes/{child}/weights{rest}").into();
+                let parts = pointer.as_str().and_then(|p| p.strip_prefix("/nodes/")?.split_once('/'));
+                let Some((node, path)) = parts.filter(|p| p.1.split('/').next() == Some("weights")) else {
+                    continue;
+                };
+                if let Some(child) = node.parse().ok().and_then(|n: u64| moved.get(&n)) {
+                    *pointer = format!("/nodes/{child}/{path}").into();
                 }
             }
         }

@@ -59,9 +59,13 @@ const INDICES: u64 = 34_963;
 /// Where an accessor names its view.
 const PLACES: [&str; 3] = ["", "/sparse/indices", "/sparse/values"];
 
+/// An accessor, and where in it the view is named.
+type User = (u64, &'static str);
+
+/// New accessors on their way.
 #[derive(Default)]
 pub(super) struct Pool {
-    parts: BTreeMap<Kind, (Vec<u8>, Vec<(u64, &'static str)>)>,
+    parts: BTreeMap<Kind, (Vec<u8>, Vec<User>)>,
     made: BTreeMap<Tag, Vec<u64>>,
 }
 
