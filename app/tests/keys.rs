@@ -214,7 +214,7 @@ fn markers_keys_and_frames_are_stepped_through() {
 }
 
 /// A face with two shapes, `w0` and `w1`.
-fn face() -> State {
+pub fn face() -> State {
     let (skeleton, of) = Skeleton::new(vec![BoneDesc { length: 1.0, ..BoneDesc::new("head") }]).unwrap();
     let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
     let shape = |by: Vec3| MorphTarget { positions: vec![by; 3], ..MorphTarget::default() };
