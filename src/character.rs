@@ -367,15 +367,6 @@ impl Character {
         skin::deform_positions(method, rest.positions, palette, out);
     }
 
-    /// Rest positions of an instance under the pose's morph weights.
-    ///
-    /// # Panics
-    /// If `instance` or `pose` are not of this character.
-    pub(crate) fn morphed(&self, instance: usize, pose: &Pose, scratch: &mut Scratch, out: &mut Vec<Vec3>) {
-        out.clear();
-        out.extend(self.morph(instance, pose, &mut scratch.morphed).positions);
-    }
-
     /// World positions of an instance, all in f64: the slow reference for [`positions`](Self::positions). `bones` are
     /// `world_from_bone` as [`fk::forward_f64`] gives them.
     ///

@@ -213,7 +213,7 @@ fn a_file_with_other_clips_keeps_everything_else() {
     let character = &import.asset.character;
     let desc = BakeDesc { metric: Metric::Shell(0.1), ..desc(1e-4) };
     let baked = bake(character, &character.clips()[0], &desc).unwrap();
-    let new = NewClip { clip: &baked.clip, short: &baked.short, replaces: Some(0) };
+    let new = NewClip { clip: &baked.clip, short: &baked.short, replaces: Some(0), carried: None };
     let extras = serde_json::json!({"sinew": {"tolerance": 1e-4}}).as_object().unwrap().clone();
     let change = gltf::Change { clips: &[new], extras, ..Default::default() };
     let out = gltf::changed(&bytes, None, "file.glb", &import, change).unwrap();
@@ -239,7 +239,7 @@ fn slopes_by_a_rule_are_written_as_numbers_and_notes_find_their_clips() {
     let moving =
         Clip { name: "curved".into(), tracks: vec![Track { target: Target::Translation(BoneId(0)), curve }] };
     let still = Clip { name: "still".into(), tracks: vec![] };
-    let new = [&still, &moving].map(|clip| NewClip { clip, short: &[], replaces: None });
+    let new = [&still, &moving].map(|clip| NewClip { clip, short: &[], replaces: None, carried: None });
     let change = gltf::Change { clips: &new, ..Default::default() };
     let mut out = gltf::changed(&bytes, None, "file.glb", &import, change).unwrap();
     // What moves nothing has no animation; notes on it go nowhere, and the others' where they belong.

@@ -18,14 +18,14 @@ use sinew::skin::Weights;
 
 /// A glTF file in the making.
 #[derive(Default)]
-struct File {
-    bin: Vec<u8>,
-    accessors: Vec<Value>,
-    views: Vec<Value>,
+pub struct File {
+    pub bin: Vec<u8>,
+    pub accessors: Vec<Value>,
+    pub views: Vec<Value>,
 }
 
 impl File {
-    fn floats(&mut self, values: &[f32], kind: &str) -> usize {
+    pub fn floats(&mut self, values: &[f32], kind: &str) -> usize {
         let each = [("SCALAR", 1), ("VEC3", 3), ("VEC4", 4)].iter().find(|k| k.0 == kind).unwrap().1;
         let (lo, hi) = values.iter().fold((f32::MAX, f32::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
         let view = json!({"buffer": 0, "byteOffset": self.bin.len(), "byteLength": 4 * values.len()});
@@ -45,7 +45,7 @@ impl File {
         self.accessors.len() - 1
     }
 
-    fn done(self, mut json: Value) -> Vec<u8> {
+    pub fn done(self, mut json: Value) -> Vec<u8> {
         let mut map = json.as_object_mut().unwrap().clone();
         map.insert("accessors".into(), self.accessors.into());
         map.insert("bufferViews".into(), self.views.into());
@@ -54,10 +54,10 @@ impl File {
     }
 }
 
-const SECONDS: f32 = 1.0;
+pub const SECONDS: f32 = 1.0;
 
 /// A body of three parts that walks in a bow while its left arm waves: below a node that is turned and scaled, as some programs write it.
-fn walker(end: f32) -> Vec<u8> {
+pub fn walker(end: f32) -> Vec<u8> {
     let mut f = File::default();
     let mesh = f.floats(&[0.0, 0.0, 0.0, 30.0, 0.0, 0.0, 0.0, 20.0, 10.0], "VEC3");
     let times: Vec<f32> = (0..=30).map(|k| k as f32 / 30.0 * SECONDS).collect();
@@ -299,7 +299,7 @@ fn boxes_of_vertices_find_the_same_worst_vertex_as_all_of_them() {
             "{got:?} {want}"
         );
         let profile = Gauge::new(c, 1)
-            .profile(&a, &b, &times)
+            .profile(&a, &b, &times, 0.0)
             .into_iter()
             .fold(Default::default(), sinew::bake::Worst::worse);
         assert_eq!(profile, got);
@@ -428,6 +428,32 @@ fn channels_keep_what_is_said_of_them_and_those_of_others_stay() {
         Vec3::new(x, 0.0, z).length() > 0.5
             && (way.last().unwrap()[0].as_f64().unwrap() - x as f64).abs() < 1e-6
     );
+}
+
+#[test]
+fn what_moves_no_bone_is_cut_turned_and_joined_with_the_rest() {
+    let (dir, [a, ..]) = folder();
+    let out = path(&dir, "out.glb");
+    let of = |options: &[&str]| {
+        let run = sinew(&[&["bake", &a, "-o", &out, "-q", "-f", "--tolerance", "5mm"], options].concat());
+        assert!(run.status.success(), "{}", text(&run.stderr));
+        let all = gltf::carried(&std::fs::read(&out).unwrap(), None, "out.glb").unwrap();
+        assert_eq!((all.len(), all[0].len()), (1, 1));
+        let curve = &all[0][0].curve;
+        let at = |t: f64| {
+            let mut v = [0.0; 3];
+            curve.sample(t, &mut v);
+            v[0]
+        };
+        (curve.times().to_vec(), curve.interpolation(), [0.1, 0.4, 0.6, 1.4, 1.6].map(at))
+    };
+    let hold = Interpolation::Hold;
+    assert_eq!(of(&[]), (vec![0.0, 1.0], hold, [1.0, 1.0, 1.0, 0.0, 0.0]));
+    assert_eq!(of(&["--speed", "2"]), (vec![0.0, 0.5], hold, [1.0, 1.0, 0.0, 0.0, 0.0]));
+    assert_eq!(of(&["--trim", "0.75.."]).2, [1.0, 0.0, 0.0, 0.0, 0.0].map(|v: f32| v));
+    assert_eq!(of(&["--reverse"]).2[1], 1.0);
+    let joined = of(&["--concat", "both"]);
+    assert_eq!(joined.2, [1.0, 1.0, 1.0, 0.0, 0.0]);
 }
 
 #[test]

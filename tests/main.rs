@@ -4,6 +4,8 @@ mod architecture;
 #[cfg(feature = "io")]
 mod bake;
 #[cfg(feature = "cli")]
+mod bake_forms;
+#[cfg(feature = "cli")]
 mod batch;
 mod channels;
 #[cfg(feature = "cli")]
@@ -25,6 +27,8 @@ mod golden;
 mod looks;
 #[cfg(feature = "pictures")]
 mod picture;
+#[cfg(feature = "cli")]
+mod quantize;
 mod raster;
 mod ray;
 #[cfg(feature = "io")]

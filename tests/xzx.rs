@@ -184,7 +184,7 @@ fn a_rig_of_angles_becomes_gltf_and_comes_back() {
 
     // glTF of it, read again.
     let back = xzx::to_quat(&again, &again.clips()[0], &desc).unwrap();
-    let new = gltf::NewClip { clip: &back.clip, short: &back.short, replaces: None };
+    let new = gltf::NewClip { clip: &back.clip, short: &back.short, replaces: None, carried: None };
     let png = sinew::io::picture::encode_png(
         &sinew::image::Rgba8 { width: 1, height: 1, data: vec![9, 8, 7, 255] },
         Default::default(),

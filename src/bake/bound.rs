@@ -11,6 +11,10 @@
 //! so norms of all of them, of their first and of their second derivatives follow from those of the tracks by the product rule. A skinned
 //! vertex is a mean of such points. The bound holds for exact arithmetic; rounding adds what single precision does to the vertices themselves.
 
+mod vertices;
+
+pub(super) use vertices::Change;
+
 use super::gauge::{Gauge, Metric};
 use crate::character::{Binding, Character};
 use crate::clip::{Clip, Curve, Interpolation, Target};

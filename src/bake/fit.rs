@@ -178,30 +178,31 @@ pub(super) struct Pieces {
 
 /// How much wider than the tolerance pieces between exact keys may be tried, so that keys moved off the curve bring them within it:
 /// a chord errs to one side, and moving it to the middle of its error halves it.
-const WIDER: [f64; 4] = [2.0, 1.7, 1.4, 1.2];
+pub(super) const WIDER: [f64; 4] = [2.0, 1.7, 1.4, 1.2];
 
 /// And where a guess will do.
-const WIDER_DRAFT: [f64; 1] = [1.7];
+pub(super) const WIDER_DRAFT: [f64; 1] = [1.7];
 
 /// Few keys whose straight pieces stay within `tolerance` of every sample; the first and the last are exact, so that loops close.
-/// `stored` is what a file will hold of a value: pieces are tried as they will be played.
+/// `stored` is what a file will hold of a value: pieces are tried as they will be played. `wider` is tried in order; the one that served is
+/// returned, 1 where none did.
 pub(super) fn fitted(
     s: &Samples,
     tolerance: f64,
-    draft: bool,
+    wider: &[f64],
     stored: impl Fn(&[f32]) -> Vec<f32>,
-) -> Pieces {
+) -> (Pieces, f64) {
     let exact = straight(s, &Near::new(tolerance), &stored);
-    for &wider in if draft { &WIDER_DRAFT[..] } else { &WIDER } {
+    for &wider in wider {
         let mut pieces = straight(s, &Near::new(wider * tolerance), &stored);
         if pieces.keys.len() < exact.keys.len() {
             settle(s, &mut pieces, &stored);
             if s.holds(&pieces, tolerance) {
-                return pieces;
+                return (pieces, wider);
             }
         }
     }
-    exact
+    (exact, 1.0)
 }
 
 /// How far pieces are from the samples at most.
@@ -395,7 +396,10 @@ impl<'v> Straight<'v> {
     fn off(&self, u: f64, value: &[f32]) -> f64 {
         let (a, b) = (self.a, self.b);
         match self.kind {
-            Kind::Rotation => 4.0 * (0.5 * chord2(self.arc(u), value).sqrt()).min(1.0).asin(),
+            Kind::Rotation => {
+                let (sine2, unit) = sine2(self.arc(u), value);
+                2.0 * (sine2 / unit.max(1e-30)).sqrt().min(1.0).asin()
+            }
             Kind::Angles => angles_apart(wide(a).lerp(wide(b), u), wide(value)),
             Kind::Vector => wide(a).lerp(wide(b), u).distance(wide(value)),
             Kind::Weights => {
@@ -406,25 +410,27 @@ impl<'v> Straight<'v> {
     }
 }
 
-/// The chord between a quaternion, once it is of unit length, and one of the nearer of a unit one's two signs, squared.
+/// The squared sine of the angle between two quaternions as vectors of four, times both squared lengths: by Lagrange's identity, so that
+/// nothing cancels; and those lengths' product.
 #[inline]
-fn chord2(q: [f64; 4], value: &[f32]) -> f64 {
-    let scale = q.iter().map(|c| c * c).sum::<f64>().sqrt().max(1e-30).recip();
-    let dot: f64 = (0..4).map(|c| q[c] * value[c] as f64).sum();
-    let scale = if dot < 0.0 { -scale } else { scale };
-    (0..4).map(|c| (q[c] * scale - value[c] as f64).powi(2)).sum()
+fn sine2(q: [f64; 4], value: &[f32]) -> (f64, f64) {
+    let v: [f64; 4] = std::array::from_fn(|c| value[c] as f64);
+    let minor = |i: usize, j: usize| (q[i] * v[j] - q[j] * v[i]).powi(2);
+    let sum = minor(0, 1) + minor(0, 2) + minor(0, 3) + minor(1, 2) + minor(1, 3) + minor(2, 3);
+    let length2 = |a: [f64; 4]| a.iter().map(|c| c * c).sum::<f64>();
+    (sum, length2(q) * length2(v))
 }
 
 /// What is near enough.
 pub(super) struct Near {
     pub tolerance: f64,
-    /// Of quaternions, the chord that belongs to it, squared.
-    chord2: f64,
+    /// Of quaternions, the sine of half of it, squared.
+    sine2: f64,
 }
 
 impl Near {
     pub fn new(tolerance: f64) -> Self {
-        Self { tolerance, chord2: (2.0 * (0.25 * tolerance.min(std::f64::consts::PI)).sin()).powi(2) }
+        Self { tolerance, sine2: (0.5 * tolerance.min(std::f64::consts::PI)).sin().powi(2) }
     }
 
     fn holds(&self, piece: &Straight, u: f64, value: &[f32]) -> bool {
@@ -434,8 +440,9 @@ impl Near {
         }
     }
 
-    /// A quaternion of any length against a unit one.
+    /// A quaternion of any length against another.
     pub fn holds_turn(&self, q: [f64; 4], value: &[f32]) -> bool {
-        chord2(q, value) <= self.chord2
+        let (sine2, unit) = sine2(q, value);
+        sine2 <= self.sine2 * unit && unit > 0.0
     }
 }

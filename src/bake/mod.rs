@@ -10,13 +10,13 @@ mod cubic;
 pub mod edit;
 mod fit;
 mod gauge;
-pub mod influences;
 mod pack;
 mod plan;
 pub mod retarget;
 #[cfg(test)]
 mod tests;
 mod times;
+pub mod vertices;
 pub mod xzx;
 
 pub use gauge::{Gauge, Lever, Looks, Metric, Spot, Stage, Watch, Worst};

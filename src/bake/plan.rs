@@ -14,6 +14,12 @@ pub(super) const SEARCH_MOMENTS: usize = 400;
 /// Vertices times moments that the search may compare in all.
 const SEARCH_WORK: usize = 400_000_000;
 
+/// What the search goes for, as a part of what is allowed: what lies between its moments may be a little more.
+const AIM: f64 = 0.97;
+
+/// And where they leave out keys.
+const SPARSE_AIM: f64 = 0.94;
+
 /// Largest error of a normalised 16-bit quaternion, radians, and of its interpolation.
 const SHORT_ERROR: f64 = 7e-5;
 
@@ -29,7 +35,42 @@ struct Job {
     /// Its share beside the others'.
     weight: f64,
     /// What it was made into with the share at hand; none if it only shows the rest.
-    made: Option<(Curve, bool)>,
+    made: Option<Made>,
+}
+
+/// What a track was made into.
+#[derive(Clone)]
+struct Made {
+    curve: Curve,
+    /// Whether its values are integers in the file.
+    short: bool,
+    form: Form,
+    /// By how much wider pieces were tried (see [`fit::fitted`]).
+    wider: f64,
+}
+
+/// How keys were found.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Form {
+    /// Straight pieces.
+    Straight,
+    /// As they were.
+    Kept,
+    /// Cubics with slopes by a rule.
+    Rule,
+    /// Cubics with slopes of their own.
+    Slopes,
+}
+
+/// How much is tried for a track.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Effort {
+    /// Straight pieces: enough to see where the share will be.
+    Draft,
+    /// What served last time.
+    Again,
+    /// All forms.
+    Full,
 }
 
 /// All tracks of a clip.
@@ -39,6 +80,8 @@ pub(super) struct Plan<'a> {
     jobs: Vec<Job>,
     share: f64,
     moments: Vec<f64>,
+    /// Whether the moments leave out keys, so that more may hide between them.
+    sparse: bool,
     vertices: usize,
 }
 
@@ -72,48 +115,57 @@ impl<'a> Plan<'a> {
             jobs.push(job);
         }
         let moments = times::coarse(clip, SEARCH_MOMENTS);
-        Self { clip, desc: desc.clone(), jobs, share: 0.5, moments, vertices }
+        let sparse = times::knots(&[clip]).len() > SEARCH_MOMENTS;
+        Self { clip, desc: desc.clone(), jobs, share: 0.5, moments, sparse, vertices }
     }
 
     /// The largest shares that keep the bound at the search's moments: all together first, then one after the other.
     pub fn search(&mut self, gauge: &Gauge) -> Baked {
-        let aim = 0.97;
+        let aim = if self.sparse { SPARSE_AIM } else { AIM };
         let looks = gauge.looks(self.clip, &self.moments);
-        let mut best = 0.0;
-        let (mut low, mut high) = (1e-4, f64::INFINITY);
-        for _ in 0..14 {
-            self.make_all(gauge, true);
-            let error = gauge.worst_of(&looks, &self.assemble()).share();
+        self.narrow(gauge, &looks, aim, true);
+        self.narrow(gauge, &looks, aim, false);
+        self.widen(gauge, &looks, aim);
+        self.finish()
+    }
+
+    /// Bring the share close to the largest that keeps `aim`.
+    fn narrow(&mut self, gauge: &Gauge, looks: &Looks, aim: f64, draft: bool) {
+        // Drafts only show the neighbourhood.
+        let (rounds, close) = if draft { (14, 0.85) } else { (6, 0.95) };
+        let (mut low, mut high) = (0.0, f64::INFINITY);
+        let mut best = None;
+        for round in 0..rounds {
+            let effort = match (draft, round) {
+                (true, _) => Effort::Draft,
+                (false, 0) => Effort::Full,
+                (false, _) => Effort::Again,
+            };
+            self.make_all(gauge, effort);
+            let error = gauge.most(looks, &self.assemble());
             if error <= aim {
-                (best, low) = (self.share, self.share);
+                low = self.share;
+                best = Some((low, self.jobs.iter().map(|j| j.made.clone()).collect::<Vec<_>>()));
             } else {
                 high = self.share;
             }
-            if high < 1.03 * low {
+            if (error <= aim && error > close * aim) || high < 1.05 * low {
                 break;
             }
             // Errors grow about as the share does.
-            let guess = self.share * 0.98 * aim / error.max(1e-30);
-            self.share = if high.is_infinite() {
-                guess.clamp(1.3 * low, 4.0 * low)
-            } else if guess > 1.01 * low && guess < 0.99 * high {
+            let guess = (self.share * 0.98 * aim / error.max(1e-30)).min(4.0 * self.share);
+            self.share = if guess > 1.02 * low && guess < 0.99 * high {
                 guess
+            } else if low > 0.0 {
+                (low * high.min(1.7 * low)).sqrt()
             } else {
-                (low * high).sqrt()
+                0.5 * self.share
             };
         }
-        self.share = best;
-        for _ in 0..6 {
-            self.make_all(gauge, false);
-            let error = gauge.worst_of(&looks, &self.assemble()).share();
-            if error <= aim {
-                break;
-            }
-            // Drafts make a little less of what they are allowed.
-            self.share *= 0.99 * aim / error;
+        if let Some((share, made)) = best {
+            self.share = share;
+            self.jobs.iter_mut().zip(made).for_each(|(job, made)| job.made = made);
         }
-        self.widen(gauge, &looks, aim);
-        self.finish()
     }
 
     /// The same with more moments.
@@ -139,7 +191,7 @@ impl<'a> Plan<'a> {
                 }
                 let kept = (self.jobs[i].weight, self.jobs[i].made.clone());
                 self.jobs[i].weight *= factor;
-                self.jobs[i].made = self.made(i, false);
+                self.jobs[i].made = self.made(i, Effort::Full);
                 if self.jobs[i].keys() < before {
                     work -= 1;
                     if !gauge.strays(looks, &self.assemble(), aim) {
@@ -154,35 +206,35 @@ impl<'a> Plan<'a> {
     /// With a part of the shares.
     pub fn within(&mut self, gauge: &Gauge, part: f64) -> Baked {
         self.share *= part;
-        self.make_all(gauge, false);
+        self.make_all(gauge, Effort::Again);
         self.finish()
     }
 
     /// Nothing left out.
     pub fn untouched(&mut self) -> Baked {
         for job in &mut self.jobs {
-            job.made = Some((job.source.clone(), false));
+            job.made = Some(Made { curve: job.source.clone(), short: false, form: Form::Kept, wider: 1.0 });
         }
         self.finish()
     }
 
-    fn make_all(&mut self, gauge: &Gauge, draft: bool) {
+    fn make_all(&mut self, gauge: &Gauge, effort: Effort) {
         let all: Vec<usize> = (0..self.jobs.len()).collect();
-        let made = gauge.map(&all, |i| self.made(i, draft));
+        let made = gauge.map(&all, |i| self.made(i, effort));
         self.jobs.iter_mut().zip(made).for_each(|(job, made)| job.made = made);
     }
 
-    fn made(&self, i: usize, draft: bool) -> Option<(Curve, bool)> {
+    fn made(&self, i: usize, effort: Effort) -> Option<Made> {
         let job = &self.jobs[i];
         let allowed = self.share * job.weight * self.desc.tolerance / job.lever;
-        job.reduced(allowed, &self.desc, draft)
+        job.reduced(allowed, &self.desc, effort)
     }
 
     fn assemble(&self) -> Clip {
-        let tracks = self.jobs.iter().filter_map(|j| {
-            let (curve, _) = j.made.as_ref()?;
-            Some(Track { target: j.target.clone(), curve: curve.clone() })
-        });
+        let tracks = self
+            .jobs
+            .iter()
+            .filter_map(|j| Some(Track { target: j.target.clone(), curve: j.made.as_ref()?.curve.clone() }));
         let mut clip = Clip { name: self.clip.name.clone(), tracks: tracks.collect() };
         self.hold_ends(&mut clip);
         if self.desc.cycle { edit::close(&clip, SEAM) } else { clip }
@@ -209,7 +261,7 @@ impl<'a> Plan<'a> {
 
     fn finish(&self) -> Baked {
         let clip = self.assemble();
-        let short: Vec<bool> = self.jobs.iter().filter_map(|j| j.made.as_ref()).map(|m| m.1).collect();
+        let short: Vec<bool> = self.jobs.iter().filter_map(|j| j.made.as_ref()).map(|m| m.short).collect();
         let keys = [self.clip.key_count(), clip.key_count()];
         let bytes = [bytes(self.clip, &[]), bytes(&clip, &short)];
         Baked { clip, short, report: Report { keys, bytes, ..Report::default() } }
@@ -237,7 +289,12 @@ pub(super) fn bytes(clip: &Clip, short: &[bool]) -> usize {
         if times.insert(bits) {
             sum += 4 * track.curve.times().len();
         }
-        sum += track.curve.values().len() * if short.get(i) == Some(&true) { 2 } else { 4 };
+        let bits = match track.target {
+            _ if short.get(i) != Some(&true) => 32,
+            Target::Weights { .. } => track.curve.integers().map_or(32, |form| form.bits),
+            _ => 16,
+        };
+        sum += track.curve.values().len() * bits / 8;
     }
     sum
 }
@@ -257,60 +314,91 @@ impl Goal {
 
 impl Job {
     fn keys(&self) -> usize {
-        self.made.as_ref().map_or(0, |m| m.0.times().len())
+        self.made.as_ref().map_or(0, |m| m.curve.times().len())
     }
 
-    /// The fewest keys within `allowed`, and whether they are 16-bit integers.
-    fn reduced(&self, allowed: f64, desc: &BakeDesc, draft: bool) -> Option<(Curve, bool)> {
-        let (s, quantize, goal) = (&self.samples, desc.quantize, desc.goal);
+    /// The fewest keys within `allowed`.
+    fn reduced(&self, allowed: f64, desc: &BakeDesc, effort: Effort) -> Option<Made> {
+        let (s, goal) = (&self.samples, desc.goal);
         if s.is_constant(&self.rest, allowed) {
             return None;
         }
-        let short = quantize && s.kind == Kind::Rotation && SHORT_ERROR < 0.3 * allowed;
-        let stored = |v: &[f32]| if short { v.iter().map(|x| shortened(*x)).collect() } else { v.to_vec() };
+        let unit = self.unit(allowed).filter(|_| desc.quantize);
+        let short = unit.is_some();
+        let stored = |v: &[f32]| match unit {
+            Some(unit) => v.iter().map(|x| (x * unit).round().clamp(-unit, unit) / unit).collect(),
+            None => v.to_vec(),
+        };
+        let made = |curve, short, form| Made { curve, short, form, wider: 1.0 };
         let first = stored(s.value(0));
         if s.is_constant(&first, allowed) {
             let curve = Curve::new(vec![s.times[0]], first, s.width, Interpolation::Hold);
-            return curve.ok().map(|c| (c, short));
+            return curve.ok().map(|c| made(c, short, Form::Straight));
         }
         if desc.keep_keys {
             // Slopes need more than 16 bits hold.
             let source = self.source.with_slopes();
             let short = short && source.interpolation() != Interpolation::Hermite;
-            let values = if short {
-                source.values().iter().map(|x| shortened(*x)).collect()
-            } else {
-                source.values().to_vec()
-            };
+            let values = if short { stored(source.values()) } else { source.values().to_vec() };
             let curve = Curve::new(source.times().to_vec(), values, s.width, source.interpolation());
-            return curve.ok().map(|c| (c, short));
+            return curve.ok().map(|c| made(c, short, Form::Kept));
         }
         if self.source.interpolation() == Interpolation::Hold {
-            return Some((self.steps(allowed, stored), short));
+            return Some(made(self.steps(allowed, stored), short, Form::Straight));
+        }
+        let last = self.made.as_ref().filter(|_| effort == Effort::Again);
+        let tried = |form: Form| last.is_none_or(|last| last.form == form);
+        if last.is_some_and(|last| last.form == Form::Slopes) {
+            return Some(made(cubic::own_slopes(s, allowed), false, Form::Slopes));
         }
         let own = [Interpolation::Linear, Interpolation::Hermite].contains(&self.source.interpolation());
-        let pieces = fit::fitted(s, allowed, draft, stored);
-        let mut best = (self.straight(&pieces), short);
+        let wider = match last {
+            Some(last) if last.wider > 1.0 => std::slice::from_ref(&last.wider),
+            Some(_) => &[],
+            None if effort == Effort::Draft => &fit::WIDER_DRAFT,
+            None => &fit::WIDER,
+        };
+        let (pieces, wider) = fit::fitted(s, allowed, wider, stored);
+        let mut best = Made { wider, ..made(self.straight(&pieces), short, Form::Straight) };
         let mut others = vec![];
         // Keys that stay where all of them were share their times with other tracks.
         if goal == Goal::Bytes && self.source.interpolation() == Interpolation::Linear {
-            others.push((self.straight(&fit::all(s, stored)), short));
+            others.push(made(self.straight(&fit::all(s, stored)), short, Form::Kept));
         } else if own || goal == Goal::Keys {
-            others.push((self.source.clone(), false));
+            others.push(made(self.source.clone(), false, Form::Kept));
         }
         // No cubic is smaller than three straight pieces, and for a draft both cost the same error.
-        if pieces.keys.len() > 4 && !draft {
-            if goal == Goal::Keys {
-                others.push((cubic::by_rule(s, allowed), false));
+        if pieces.keys.len() > 4 && effort != Effort::Draft {
+            if goal == Goal::Keys && tried(Form::Rule) {
+                others.push(made(cubic::by_rule(s, allowed), false, Form::Rule));
             }
-            others.push((cubic::own_slopes(s, allowed), false));
+            if tried(Form::Slopes) {
+                others.push(made(cubic::own_slopes(s, allowed), false, Form::Slopes));
+            }
         }
-        for (curve, short) in others {
-            if goal.cost(&curve, short, &self.source) < goal.cost(&best.0, best.1, &self.source) {
-                best = (curve, short);
+        let cost = |made: &Made| goal.cost(&made.curve, made.short, &self.source);
+        for other in others {
+            if cost(&other) < cost(&best) {
+                best = Made { wider, ..other };
             }
         }
         Some(best)
+    }
+
+    /// The integer that stands for 1, if integers hold the track's values well enough: a third of what is allowed, or exactly.
+    fn unit(&self, allowed: f64) -> Option<f32> {
+        match self.samples.kind {
+            Kind::Rotation => (SHORT_ERROR < 0.3 * allowed).then_some(32_767.0),
+            Kind::Weights => {
+                let values = self.source.values();
+                let within = |least: f32| values.iter().all(|v| (least..=1.0).contains(v));
+                let units = if within(0.0) { [255.0, 65_535.0] } else { [127.0, 32_767.0] };
+                let exact = self.source.integers().map(|form| form.unit());
+                let fine = |unit: &f32| 0.5 / (*unit as f64) < 0.3 * allowed || exact == Some(*unit);
+                units.into_iter().find(fine).filter(|_| within(-1.0))
+            }
+            _ => None,
+        }
     }
 
     fn straight(&self, pieces: &fit::Pieces) -> Curve {
@@ -334,9 +422,4 @@ impl Job {
         }
         Curve::new(times, values, width, Interpolation::Hold).expect("keys of a curve, in order")
     }
-}
-
-/// What a normalised 16-bit integer holds of a number in −1…1.
-fn shortened(x: f32) -> f32 {
-    (x * 32767.0).round().clamp(-32767.0, 32767.0) / 32767.0
 }

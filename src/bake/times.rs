@@ -4,6 +4,45 @@ use super::bound::Bound;
 use super::gauge::{Gauge, Worst};
 use crate::clip::Clip;
 
+/// Two motions of the same points.
+pub(super) trait Motions: Sync {
+    /// How far they are apart at each of these times; what is below this share of the limit may be told as that.
+    fn apart(&self, times: &[f64], floor: f64) -> Vec<Worst>;
+    /// How far at any of them, where that is less work than to tell each.
+    fn worst(&self, _times: &[f64]) -> Worst {
+        Worst::default()
+    }
+    /// The largest second derivative of the way from one to the other between two moments, as a part of the limit.
+    fn bend(&self, times: [f64; 2]) -> f64;
+    /// The end of a span as seen from within it: just before, where something jumps there.
+    fn end_before(&self, t: f64) -> f64;
+}
+
+/// One character moved by two clips.
+struct Clips<'a> {
+    gauge: &'a Gauge<'a>,
+    bound: Bound<'a>,
+    clips: [&'a Clip; 2],
+}
+
+impl Motions for Clips<'_> {
+    fn apart(&self, times: &[f64], floor: f64) -> Vec<Worst> {
+        self.gauge.profile(self.clips[0], self.clips[1], times, floor)
+    }
+
+    fn worst(&self, times: &[f64]) -> Worst {
+        self.gauge.worst(self.clips[0], self.clips[1], times)
+    }
+
+    fn bend(&self, times: [f64; 2]) -> f64 {
+        self.bound.bend(self.clips, times)
+    }
+
+    fn end_before(&self, t: f64) -> f64 {
+        self.bound.end_before(t)
+    }
+}
+
 /// Gaps between keys that are worked on together, so that memory does not grow with a clip's length.
 const GAPS: usize = 2048;
 
@@ -12,6 +51,12 @@ const BRACKET: f64 = 1.02;
 
 /// Rounds of halving that only bring the bound closer, and gaps in each.
 const CLOSER: [usize; 2] = [12, 64];
+
+/// Every so many moments are looked at first, for what the worst will be near.
+const FIRST: usize = 16;
+
+/// Shares below this part of the worst are not told apart.
+const SHOWN: f64 = 0.6;
 
 /// Moments over the limit that are told of.
 const OVER: usize = 64;
@@ -59,19 +104,22 @@ struct Gap {
     depth: u32,
 }
 
-/// Compare two clips at all keys, and between them wherever more than is allowed could hide: gaps are halved until [`Bound`] says that nothing
-/// does, or until a moment is found at which the limit is exceeded.
+/// Compare two clips at all keys, and between them.
 pub(super) fn verify(gauge: &Gauge, a: &Clip, b: &Clip) -> Verdict {
-    let knots = knots(&[a, b]);
-    let bound = Bound::new(gauge, [a, b]);
+    bracket(gauge, &knots(&[a, b]), &Clips { gauge, bound: Bound::new(gauge, [a, b]), clips: [a, b] })
+}
+
+/// Compare two motions at all knots, and between them wherever more than is allowed could hide: gaps are halved until their second derivatives
+/// say that nothing does, or until a moment is found at which the limit is exceeded.
+pub(super) fn bracket(gauge: &Gauge, knots: &[f64], motions: &impl Motions) -> Verdict {
     let mut verdict = Verdict::default();
     if knots.len() < 2 {
-        verdict.look(gauge, [a, b], &[knots.first().copied().unwrap_or(0.0)]);
+        verdict.look(motions, &[knots.first().copied().unwrap_or(0.0)]);
         verdict.ceiling = verdict.worst.share();
     }
     for part in 0..knots.len().saturating_sub(1).div_ceil(GAPS) {
         let knots = &knots[part * GAPS..((part + 1) * GAPS + 1).min(knots.len())];
-        let ceiling = verdict.cover(gauge, &bound, [a, b], knots);
+        let ceiling = verdict.cover(gauge, motions, knots);
         verdict.ceiling = verdict.ceiling.max(ceiling);
         if verdict.worst.share() > 1.0 {
             break;
@@ -81,27 +129,33 @@ pub(super) fn verify(gauge: &Gauge, a: &Clip, b: &Clip) -> Verdict {
 }
 
 impl Verdict {
-    /// The shares at these moments.
-    fn look(&mut self, gauge: &Gauge, clips: [&Clip; 2], times: &[f64]) -> Vec<f64> {
-        let found = gauge.profile(clips[0], clips[1], times);
+    /// What the shares at these moments do not exceed.
+    fn look(&mut self, motions: &impl Motions, times: &[f64]) -> Vec<f64> {
+        if self.moments == 0 {
+            let first: Vec<f64> = times.iter().copied().step_by(FIRST).collect();
+            self.worst = motions.worst(&first);
+        }
+        // Shares far below the worst need not be known exactly.
+        let floor = SHOWN * self.worst.share();
+        let found = motions.apart(times, floor);
         self.moments += times.len();
         self.worst = found.iter().copied().fold(self.worst, Worst::worse);
         let mut over: Vec<&Worst> = found.iter().filter(|w| w.share() > 1.0).collect();
         over.sort_by(|a, b| b.share().total_cmp(&a.share()).then(a.time.total_cmp(&b.time)));
         self.over.extend(over.iter().take(OVER).map(|w| w.time));
-        found.iter().map(Worst::share).collect()
+        found.iter().map(|w| w.share().max(floor)).collect()
     }
 
     /// A bound for all of the time between the first and the last knot.
-    fn cover(&mut self, gauge: &Gauge, bound: &Bound, clips: [&Clip; 2], knots: &[f64]) -> f64 {
+    fn cover(&mut self, gauge: &Gauge, motions: &impl Motions, knots: &[f64]) -> f64 {
         let ends: Vec<f64> = knots
             .windows(2)
-            .flat_map(|w| [w[0], bound.end_before(w[1])])
+            .flat_map(|w| [w[0], motions.end_before(w[1])])
             .chain(knots.last().copied())
             .collect();
         let mut moments = ends.clone();
         moments.dedup();
-        let shares = self.look(gauge, clips, &moments);
+        let shares = self.look(motions, &moments);
         let share = |t: f64| shares[moments.partition_point(|m| *m < t)];
         let gaps = ends.chunks_exact(2).map(|e| [e[0], e[1]]).filter(|e| e[0] < e[1]);
         let open: Vec<Gap> =
@@ -112,7 +166,7 @@ impl Verdict {
         let mut rounds = 0;
         loop {
             let spans: Vec<_> = fresh.iter().map(|g| g.times).collect();
-            let bends = gauge.map(&spans, |times| bound.bend(clips, times));
+            let bends = gauge.map(&spans, |times| motions.bend(times));
             for (gap, bend) in fresh.iter_mut().zip(bends) {
                 let h = gap.times[1] - gap.times[0];
                 gap.ceiling = gap.shares[0].max(gap.shares[1]) + h * h / 8.0 * bend;
@@ -132,14 +186,14 @@ impl Verdict {
             if worst > 1.0 || wide == 0 || spent {
                 return ceiling;
             }
-            fresh = self.halve(gauge, clips, &known[..wide]);
+            fresh = self.halve(motions, &known[..wide]);
             known.drain(..wide);
         }
     }
 
-    fn halve(&mut self, gauge: &Gauge, clips: [&Clip; 2], gaps: &[Gap]) -> Vec<Gap> {
+    fn halve(&mut self, motions: &impl Motions, gaps: &[Gap]) -> Vec<Gap> {
         let middles: Vec<f64> = gaps.iter().map(|g| 0.5 * (g.times[0] + g.times[1])).collect();
-        let shares = self.look(gauge, clips, &middles);
+        let shares = self.look(motions, &middles);
         let halves = |((gap, &t), &share): ((&Gap, &f64), &f64)| {
             let half = |times, shares| Gap { times, shares, ceiling: f64::NAN, depth: gap.depth + 1 };
             [half([gap.times[0], t], [gap.shares[0], share]), half([t, gap.times[1]], [share, gap.shares[1]])]

@@ -66,6 +66,22 @@ pub enum CurveError {
     },
 }
 
+/// Integers that stand for parts of 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Integers {
+    /// 8 or 16.
+    pub bits: usize,
+    /// Down to −1, or from 0.
+    pub signed: bool,
+}
+
+impl Integers {
+    /// The integer that means 1.
+    pub fn unit(self) -> f32 {
+        ((1u32 << (self.bits - usize::from(self.signed))) - 1) as f32
+    }
+}
+
 impl Curve {
     /// Check keys and freeze them. `values` holds `width` numbers a key (three times that for
     /// [`Interpolation::Hermite`]: in-slope, value, out-slope). Of keys at one time the last wins.
@@ -114,6 +130,16 @@ impl Curve {
     /// The stored numbers, key by key.
     pub fn values(&self) -> &[f32] {
         &self.values
+    }
+
+    /// The smallest normalised integers that hold every value exactly, if any do.
+    pub fn integers(&self) -> Option<Integers> {
+        let forms = [(8, false), (8, true), (16, false), (16, true)];
+        forms.into_iter().map(|(bits, signed)| Integers { bits, signed }).find(|form| {
+            let (unit, least) = (form.unit(), if form.signed { -1.0 } else { 0.0 });
+            let exact = |v: &f32| (least..=1.0).contains(v) && (v * unit).round() / unit == *v;
+            self.values.iter().all(exact)
+        })
     }
 
     /// Numbers a key.
@@ -206,7 +232,7 @@ impl Curve {
         if matches!(self.interpolation, Interpolation::Hold | Interpolation::Linear) {
             return 0.0;
         }
-        let k = self.times.partition_point(|&k| k <= t);
+        let k = self.after(t);
         if k == 0 || k == self.times.len() {
             return 0.0;
         }
@@ -221,9 +247,19 @@ impl Curve {
         ((6.0 - 12.0 * u) * rise / h + (6.0 * u - 4.0) * m0 + (6.0 * u - 2.0) * m1) / h
     }
 
+    /// The first key after `t`, or the number of keys.
+    fn after(&self, t: f64) -> usize {
+        let keys = &self.times[..];
+        let [first, last] = [keys[0], keys[keys.len() - 1]];
+        // Most keys are equally far apart.
+        let guess = ((t - first) / (last - first) * (keys.len() - 1) as f64) as usize + 1;
+        let hit = guess < keys.len() && keys[guess - 1] <= t && t < keys[guess];
+        if hit { guess } else { keys.partition_point(|&k| k <= t) }
+    }
+
     fn locate(&self, t: f64) -> Place {
         // The last key at or before t: of keys at one time the last wins.
-        let after = self.times.partition_point(|&k| k <= t);
+        let after = self.after(t);
         if after == 0 {
             return Place::Key(self.times.partition_point(|&k| k <= self.times[0]) - 1);
         }

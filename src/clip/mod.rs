@@ -5,7 +5,7 @@ mod edit;
 mod mirror;
 pub(crate) mod packed;
 
-pub use curve::{Curve, CurveError, Interpolation};
+pub use curve::{Curve, CurveError, Integers, Interpolation};
 pub use edit::Retime;
 pub use packed::{Packed, PackedError};
 

@@ -20,17 +20,25 @@ pub static LINEAR_OF_SRGB8: LazyLock<[f32; 256]> =
 static THRESHOLDS: LazyLock<[f32; 255]> =
     LazyLock::new(|| std::array::from_fn(|i| linear_from_srgb((i as f32 + 0.5) / 255.0)));
 
-/// A first guess of the code for 1024 equal steps of √(linear light); it is never above the code.
-static GUESS: LazyLock<[u8; 1025]> = LazyLock::new(|| {
-    std::array::from_fn(|i| {
-        let c = (i as f32 / 1024.0).powi(2);
-        THRESHOLDS.partition_point(|&t| t <= c) as u8
-    })
+/// Least light of the table of [`STEPS`]: the code is 0 below.
+pub(crate) const DARK: f32 = 1.0 / 8192.0;
+
+/// Codes by the upper half of the bits of light in [`DARK`]…1, 128 intervals an octave: the code at the interval's start times 2¹⁶,
+/// plus what makes the sum with the lower half of the bits reach the next code where light does. No interval holds two steps.
+pub(crate) static STEPS: LazyLock<[u32; 2048]> = LazyLock::new(|| {
+    let mut table = [255 << 16; 2048];
+    for (i, entry) in table.iter_mut().take(13 * 128).enumerate() {
+        let first = DARK.to_bits() + ((i as u32) << 16);
+        let code = THRESHOLDS.partition_point(|t| t.to_bits() <= first);
+        let to_next = THRESHOLDS.get(code).map_or(1 << 16, |t| (t.to_bits() - first).min(1 << 16));
+        *entry = ((code as u32) << 16) + (1 << 16) - to_next;
+    }
+    table
 });
 
 /// The nearest 8-bit sRGB code of linear light; NaN gives 0, values outside 0…1 are clipped.
 ///
-/// Exact: the code whose decoded sRGB value is nearest in sRGB, by comparing with 255 thresholds.
+/// Exact: the code whose decoded sRGB value is nearest in sRGB.
 ///
 /// ```
 /// use sinew::image::color::{LINEAR_OF_SRGB8, srgb8};
@@ -38,12 +46,9 @@ static GUESS: LazyLock<[u8; 1025]> = LazyLock::new(|| {
 /// ```
 #[inline]
 pub fn srgb8(c: f32) -> u8 {
-    let c = if c > 0.0 { c.min(1.0) } else { 0.0 };
-    let mut code = GUESS[(c.sqrt() * 1024.0) as usize] as usize;
-    while code < 255 && THRESHOLDS[code] <= c {
-        code += 1;
-    }
-    code as u8
+    let bits = if c > DARK { c.min(1.0) } else { DARK }.to_bits();
+    let place = (bits >> 16) - (DARK.to_bits() >> 16);
+    ((STEPS[place as usize & 2047] + (bits & 0xffff)) >> 16) as u8
 }
 
 /// One linear, premultiplied pixel as 8-bit sRGB with straight alpha.
@@ -81,5 +86,9 @@ mod tests {
             assert!((srgb8(c) as f32 - want).abs() <= 0.5 + 1e-3, "{c}: {} {want}", srgb8(c));
         }
         assert_eq!((srgb8(f32::NAN), srgb8(-1.0), srgb8(f32::INFINITY)), (0, 0, 255));
+        for (code, &t) in THRESHOLDS.iter().enumerate() {
+            let below = f32::from_bits(t.to_bits() - 1);
+            assert_eq!((srgb8(below), srgb8(t)), (code as u8, code as u8 + 1));
+        }
     }
 }

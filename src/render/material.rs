@@ -25,19 +25,27 @@ pub(crate) trait Points {
     fn tangent_frame(&self, normal: V8, map: &TextureRef) -> (V8, V8);
 }
 
-/// The scene's textures at eight points.
-struct Maps<'a> {
+/// The scene's textures at eight points, or nothing where a material has none: of that case the compiler leaves no trace of textures.
+struct Maps<'a, const ANY: bool> {
     isa: Isa,
     scene: &'a Scene<'a>,
     uv: [Uv; 2],
 }
 
-impl<'a> Maps<'a> {
+/// All maps of a material.
+#[inline(always)]
+fn maps(m: &Material) -> impl Iterator<Item = &TextureRef> {
+    let maps = [&m.diffuse_map, &m.specular_map, &m.emissive_map, &m.normal_map, &m.occlusion_map];
+    maps.into_iter().flatten()
+}
+
+impl<'a, const ANY: bool> Maps<'a, ANY> {
     #[inline(always)]
     fn new(isa: Isa, scene: &'a Scene, m: &Material, p: &impl Points) -> Self {
-        let maps = [&m.diffuse_map, &m.specular_map, &m.emissive_map, &m.normal_map, &m.occlusion_map];
         let mut used = [false; 2];
-        maps.iter().filter_map(|m| m.as_ref()).for_each(|m| used[(m.uv_set & 1) as usize] = true);
+        if ANY {
+            maps(m).for_each(|m| used[(m.uv_set & 1) as usize] = true);
+        }
         let mut uv = [Uv::ZERO; 2];
         for set in 0..2 {
             if used[set] {
@@ -50,23 +58,22 @@ impl<'a> Maps<'a> {
     /// `None` where there is no such map, or the scene has no such texture.
     #[inline(always)]
     fn texel(&self, map: &Option<TextureRef>) -> Option<[F8; 4]> {
-        let map = map.as_ref()?;
-        self.look_up(map)
+        if ANY { self.look_up(map.as_ref()?) } else { None }
     }
 
     #[inline(never)]
     fn look_up(&self, map: &TextureRef) -> Option<[F8; 4]> {
         let texture = self.scene.textures.get(map.texture.0 as usize)?;
-        let uv = transformed(self.uv[(map.uv_set & 1) as usize], &map.transform);
-        Some(sample::sample(self.isa, texture, &uv))
+        let uv = &self.uv[(map.uv_set & 1) as usize];
+        if map.transform == Affine2::IDENTITY {
+            return Some(sample::sample(self.isa, texture, uv));
+        }
+        Some(sample::sample(self.isa, texture, &transformed(uv, &map.transform)))
     }
 }
 
 #[inline(always)]
-fn transformed(uv: Uv, by: &Affine2) -> Uv {
-    if *by == Affine2::IDENTITY {
-        return uv;
-    }
+fn transformed(uv: &Uv, by: &Affine2) -> Uv {
     let (x, y, t) = (by.matrix2.x_axis, by.matrix2.y_axis, by.translation);
     let turn = |a: F8, b: F8| [a * x.x + b * y.x, a * x.y + b * y.y];
     let [u, v] = turn(uv.u, uv.v);
@@ -75,7 +82,7 @@ fn transformed(uv: Uv, by: &Affine2) -> Uv {
 
 /// `k_d` and alpha.
 #[inline(always)]
-fn diffuse(maps: &Maps, m: &Material, p: &impl Points) -> (V8, F8) {
+fn diffuse<const ANY: bool>(maps: &Maps<ANY>, m: &Material, p: &impl Points) -> (V8, F8) {
     let d = m.diffuse;
     let (mut rgb, mut alpha) = (V8::splat(d.truncate()), F8::splat(d.w));
     if let Some(c) = p.color() {
@@ -93,7 +100,9 @@ fn diffuse(maps: &Maps, m: &Material, p: &impl Points) -> (V8, F8) {
 #[inline(always)]
 pub(crate) fn present(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> I8 {
     match m.alpha {
-        AlphaMode::Mask(cut_off) => diffuse(&Maps::new(isa, scene, m, p), m, p).1.ge(F8::splat(cut_off)),
+        AlphaMode::Mask(cut_off) => {
+            diffuse(&Maps::<true>::new(isa, scene, m, p), m, p).1.ge(F8::splat(cut_off))
+        }
         _ => I8::splat(-1),
     }
 }
@@ -101,13 +110,13 @@ pub(crate) fn present(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) ->
 /// Alpha of what has any, 0…1.
 #[inline(always)]
 pub(crate) fn alpha(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> F8 {
-    diffuse(&Maps::new(isa, scene, m, p), m, p).1.clamp01()
+    diffuse(&Maps::<true>::new(isa, scene, m, p), m, p).1.clamp01()
 }
 
 /// What is to be lit, and alpha as in [`light`]; what is unlit shines by itself.
 #[inline(always)]
 pub(crate) fn surface(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> (Surface<F8>, F8) {
-    let maps = &Maps::new(isa, scene, m, p);
+    let maps = &Maps::<true>::new(isa, scene, m, p);
     let (k_d, alpha) = diffuse(maps, m, p);
     let alpha = if m.alpha == AlphaMode::Blend { alpha.clamp01() } else { F8::ONE };
     let surface = lit(maps, m, p, k_d);
@@ -121,7 +130,15 @@ pub(crate) fn surface(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) ->
 /// Linear light, and alpha: 1 unless the material blends. Not multiplied.
 #[inline(always)]
 pub(crate) fn light(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> (V8, F8) {
-    let maps = &Maps::new(isa, scene, m, p);
+    if maps(m).next().is_some() {
+        return shine(&Maps::<true>::new(isa, scene, m, p), m, p);
+    }
+    shine(&Maps::<false>::new(isa, scene, m, p), m, p)
+}
+
+#[inline(always)]
+fn shine<const ANY: bool>(maps: &Maps<ANY>, m: &Material, p: &impl Points) -> (V8, F8) {
+    let scene = maps.scene;
     let (k_d, alpha) = diffuse(maps, m, p);
     let alpha = if m.alpha == AlphaMode::Blend { alpha.clamp01() } else { F8::ONE };
     if m.unlit {
@@ -129,14 +146,16 @@ pub(crate) fn light(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> (
     }
     let surface = lit(maps, m, p, k_d);
     if !scene.style.is_plain() {
-        return (styled::light(isa, &surface, scene, &[]), alpha);
+        // What a call gets has to be in memory; with a copy of its own, the other way's surface stays in registers.
+        let copy = surface;
+        return (styled::light(maps.isa, &copy, scene, &[]), alpha);
     }
     (shade::blinn_phong(&surface, scene.ambient, &scene.lights), alpha)
 }
 
 /// What the textures make of the coefficients.
 #[inline(always)]
-fn lit(maps: &Maps, m: &Material, p: &impl Points, k_d: V8) -> Surface<F8> {
+fn lit<const ANY: bool>(maps: &Maps<ANY>, m: &Material, p: &impl Points, k_d: V8) -> Surface<F8> {
     let (specular, shininess) = highlight(maps, m);
     let mut emissive = V8::splat(m.emissive);
     if let Some(t) = maps.texel(&m.emissive_map) {
@@ -161,7 +180,7 @@ fn lit(maps: &Maps, m: &Material, p: &impl Points, k_d: V8) -> Surface<F8> {
 
 /// `k_s` and `p`.
 #[inline(always)]
-fn highlight(maps: &Maps, m: &Material) -> (V8, F8) {
+fn highlight<const ANY: bool>(maps: &Maps<ANY>, m: &Material) -> (V8, F8) {
     let (k_s, shininess) = (V8::splat(m.specular), F8::splat(m.shininess));
     match maps.texel(&m.specular_map) {
         Some(t) => (k_s * V8 { x: t[0], y: t[1], z: t[2] }, simd::pow(shininess, t[3])),
@@ -172,12 +191,12 @@ fn highlight(maps: &Maps, m: &Material) -> (V8, F8) {
 /// The shading normal, normal map included, scene space.
 #[inline(always)]
 pub(crate) fn shading_normal(isa: Isa, scene: &Scene, m: &Material, p: &impl Points) -> V8 {
-    normal(&Maps::new(isa, scene, m, p), m, p)
+    normal(&Maps::<true>::new(isa, scene, m, p), m, p)
 }
 
 /// The shading normal, on the eye's side.
 #[inline(always)]
-fn normal(maps: &Maps, m: &Material, p: &impl Points) -> V8 {
+fn normal<const ANY: bool>(maps: &Maps<ANY>, m: &Material, p: &impl Points) -> V8 {
     let mut n = p.normal();
     if let (Some(map), Some(t)) = (&m.normal_map, maps.texel(&m.normal_map)) {
         let (tangent, bitangent) = p.tangent_frame(n, map);

@@ -87,7 +87,10 @@ fn lod(t: &Texture, uv: &Uv) -> F8 {
 
 /// Sizes of each lane's level along one side.
 #[inline(always)]
-fn size(full: u32, level: I8) -> I8 {
+fn size(full: u32, level: I8, same: bool) -> I8 {
+    if same {
+        return I8::splat((full >> (level.0[0] & 31)).max(1) as i32);
+    }
     let mut s = I8::ZERO;
     for k in 0..8 {
         s.0[k] = (full >> (level.0[k] & 31)).max(1) as i32;
@@ -150,7 +153,7 @@ fn table(t: &Texture) -> &'static [f32; 256] {
 
 #[inline(always)]
 fn nearest(t: &Texture, uv: &Uv, level: I8) -> [F8; 4] {
-    let (w, h) = (size(t.width(), level), size(t.height(), level));
+    let (w, h) = (size(t.width(), level, false), size(t.height(), level, false));
     let [wrap_u, wrap_v] = t.wrap();
     let index = |x: F8, size: I8| (x * size.to_f32()).floor().max(I8::ZERO).min(size - I8::splat(1));
     let (x, y) = (index(wrapped(uv.u, wrap_u), w), index(wrapped(uv.v, wrap_v), h));
@@ -178,8 +181,8 @@ fn neighbours(x: F8, size: I8, mode: WrapMode) -> (I8, I8, F8) {
 
 /// Where the four texels around each point are: the first of two in the upper row and in the lower, and the weights of all.
 #[inline(always)]
-fn around(t: &Texture, uv: &Uv, level: I8, weight: F8) -> ([I8; 2], [[F8; 2]; 2]) {
-    let (w, h) = (size(t.width(), level), size(t.height(), level));
+fn around(t: &Texture, uv: &Uv, level: I8, same: bool, weight: F8) -> ([I8; 2], [[F8; 2]; 2]) {
+    let (w, h) = (size(t.width(), level, same), size(t.height(), level, same));
     let [wrap_u, wrap_v] = t.wrap();
     let (x, _, fx) = neighbours(uv.u, w, wrap_u);
     let (y0, y1, fy) = neighbours(uv.v, h, wrap_v);
@@ -195,14 +198,13 @@ fn around(t: &Texture, uv: &Uv, level: I8, weight: F8) -> ([I8; 2], [[F8; 2]; 2]
 /// come from far away.
 #[inline(always)]
 fn add_packed(t: &Texture, uv: &Uv, level: I8, weight: F8, sum: &mut [F8; 4]) {
-    let (at, weights) = around(t, uv, level, weight);
-    let mut levels: [&[u32]; 8] = [&[]; 8];
-    let same = level == I8::splat(level.0[0]);
-    for k in 0..8 {
-        levels[k] = match t.texels(level.0[if same { 0 } else { k }] as usize) {
-            Level::Packed(texels) => texels,
-            Level::Wide(_) => &[],
-        };
+    let same = level.equal(I8::splat(level.0[0])).all();
+    let (at, weights) = around(t, uv, level, same, weight);
+    let mut levels = [packed(t, level.0[0]); 8];
+    if !same {
+        for k in 1..8 {
+            levels[k] = packed(t, level.0[k]);
+        }
     }
     for j in 0..2 {
         let (mut left, mut right) = (I8::ZERO, I8::ZERO);
@@ -212,6 +214,14 @@ fn add_packed(t: &Texture, uv: &Uv, level: I8, weight: F8, sum: &mut [F8; 4]) {
         }
         add_squares(sum, left, weights[j][0]);
         add_squares(sum, right, weights[j][1]);
+    }
+}
+
+#[inline(always)]
+fn packed(t: &Texture, level: i32) -> &[u32] {
+    match t.texels(level as usize) {
+        Level::Packed(texels) => texels,
+        Level::Wide(_) => &[],
     }
 }
 
@@ -231,7 +241,7 @@ fn add_squares(sum: &mut [F8; 4], texel: I8, weight: F8) {
 /// Each lane takes the two texels of a row in one load, all channels side by side.
 #[inline(always)]
 fn add_wide(t: &Texture, uv: &Uv, level: I8, weight: F8, sum: &mut [F8; 4]) {
-    let (at, weights) = around(t, uv, level, weight * (1.0 / 65535.0));
+    let (at, weights) = around(t, uv, level, false, weight * (1.0 / 65535.0));
     for k in 0..8 {
         let Level::Wide(texels) = t.texels(level.0[k] as usize) else { return };
         let row = |j: usize| &texels[4 * at[j].0[k] as usize..][..8];

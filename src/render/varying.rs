@@ -19,6 +19,8 @@ pub(crate) struct Varying<'a, const ONE: bool, S> {
     /// Barycentric coordinates in scene space.
     pub b: [F8; 3],
     pub p: [V8; 3],
+    /// The corners' normals, if they were looked up before.
+    pub normals: Option<[V8; 3]>,
     pub position: V8,
     pub view: V8,
     pub slopes: S,
@@ -63,6 +65,9 @@ impl<const ONE: bool, S: Slopes> Points for Varying<'_, ONE, S> {
 
     #[inline(always)]
     fn normal(&self) -> V8 {
+        if let Some(n) = &self.normals {
+            return mix(&self.b, n).unit();
+        }
         let list = self.object.normals;
         if list.is_empty() {
             return self.face().unit();

@@ -9,9 +9,10 @@
 
 mod process;
 
+use nix::sys::resource::{UsageWho, getrusage};
 use process::run;
 use serde_json::{Value, json};
-use sinew::bake::{BakeDesc, Gauge, Stage, bake_watched};
+use sinew::bake::{BakeDesc, Gauge, Stage, bake, bake_watched, pack};
 use sinew::io::gltf::Rewritten;
 use sinew::io::{self, Options};
 use std::path::{Path, PathBuf};
@@ -29,7 +30,58 @@ fn main() {
     for file in files.iter().filter(|f| f.is_file()) {
         compare(file, &folder.path().join("out.glb"), rounds);
         breakdown(file);
+        sampling(file, rounds);
     }
+}
+
+/// Nanoseconds of processor time a pose, out of the clip as it came, as it was baked and packed: at random moments, and 60 times a second.
+fn sampling(file: &Path, rounds: usize) {
+    let import = io::import(file, &Options::default()).expect("a glTF file");
+    let c = &import.asset.character;
+    let desc = BakeDesc { tolerance: 1e-3 * Gauge::new(c, 1).diagonal(), ..BakeDesc::default() };
+    for clip in c.clips() {
+        let packed = pack(c, clip, &desc).expect("a bound that holds").packed;
+        let baked = bake(c, clip, &desc).expect("a bound that holds").clip;
+        let mut pose = c.rest_pose();
+        let (start, length) = (clip.range().start, clip.range().duration());
+        let mut state = 1u64;
+        let random: Vec<f64> = (0..4000)
+            .map(|_| {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                start + (state >> 11) as f64 / (1u64 << 53) as f64 * length
+            })
+            .collect();
+        let forward: Vec<f64> = (0..4000).map(|k| start + (k as f64 / 60.0) % length.max(1e-9)).collect();
+        let mut cost = [[f64::INFINITY; 2]; 3];
+        for _ in 0..rounds.max(3) {
+            for (k, times) in [&random, &forward].into_iter().enumerate() {
+                cost[0][k] = cost[0][k].min(each(times, |t| clip.sample(c.skeleton(), t, &mut pose)));
+                cost[1][k] = cost[1][k].min(each(times, |t| baked.sample(c.skeleton(), t, &mut pose)));
+                cost[2][k] = cost[2][k].min(each(times, |t| packed.sample(c.skeleton(), t, &mut pose)));
+            }
+        }
+        let ns = |c: [f64; 2]| format!("{:6.0} / {:6.0} ns", c[0], c[1]);
+        println!(
+            "  {:12} a pose, random / forward: source {}, baked {}, packed {} ({} tracks, {} bytes packed)",
+            clip.name,
+            ns(cost[0]),
+            ns(cost[1]),
+            ns(cost[2]),
+            clip.tracks.len(),
+            packed.bytes().len(),
+        );
+    }
+}
+
+/// Processor nanoseconds of each call.
+fn each(times: &[f64], mut work: impl FnMut(f64)) -> f64 {
+    let cpu = || {
+        let time = getrusage(UsageWho::RUSAGE_SELF).expect("the system counts").user_time();
+        time.tv_sec() as f64 + time.tv_usec() as f64 * 1e-6
+    };
+    let before = cpu();
+    times.iter().for_each(|t| work(std::hint::black_box(*t)));
+    1e9 * (cpu() - before) / times.len() as f64
 }
 
 fn compare(file: &Path, out: &Path, rounds: usize) {

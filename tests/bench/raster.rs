@@ -1,12 +1,13 @@
-//! Milliseconds a picture of a Blinn-Phong sphere, one thread: `cargo bench --bench raster`.
+//! Milliseconds of processor time a picture of a Blinn-Phong sphere, one thread: `cargo bench --bench raster`, or one row of it,
+//! `cargo bench --bench raster -- TRIANGLES WIDTH SAMPLES [ROUNDS]`.
 
 use glam::Vec3;
+use nix::time::{ClockId, clock_gettime};
 use sinew::image::Rgba8;
 use sinew::mesh::{Mesh, MeshData};
 use sinew::render::{Settings, raster::Rasterizer};
 use sinew::scene::{Camera, Light, LightKind, Material, Object, Projection, Scene, Style};
 use std::f32::consts::PI;
-use std::time::Instant;
 
 /// A bumpy sphere of about `n` triangles, with a sphere's normals.
 fn sphere(n: usize) -> Mesh {
@@ -28,7 +29,16 @@ fn sphere(n: usize) -> Mesh {
     Mesh::new(data).expect("a sphere is a mesh")
 }
 
+/// Processor milliseconds of this thread.
+fn cpu() -> f64 {
+    let t = clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID).expect("the system counts");
+    t.tv_sec() as f64 * 1e3 + t.tv_nsec() as f64 * 1e-6
+}
+
 fn main() {
+    let only: Vec<usize> = std::env::args().filter_map(|a| a.parse().ok()).collect();
+    let wanted = |k: usize, x: usize| only.get(k).is_none_or(|&o| o == x);
+    let rounds = only.get(3).copied().unwrap_or(25);
     let material = [Material {
         diffuse: Vec3::new(0.8, 0.5, 0.3).extend(1.0),
         specular: Vec3::splat(0.5),
@@ -36,8 +46,8 @@ fn main() {
     }];
     let projection = Projection::Perspective { fov_y: 50f32.to_radians() };
     let mut rasterizer = Rasterizer::default();
-    println!("triangles    picture  samples  ms/frame");
-    for n in [10_000, 100_000, 1_000_000] {
+    println!("triangles    picture  samples  median     least");
+    for n in [10_000, 100_000, 1_000_000].into_iter().filter(|&n| wanted(0, n)) {
         let mesh = sphere(n);
         let camera = Camera::look_at(Vec3::Z * 2.9, Vec3::ZERO, Vec3::Y, projection).expect("it looks ahead");
         let object = Object {
@@ -62,20 +72,24 @@ fn main() {
             materials: &material,
             textures: &[],
         };
-        for (width, height) in [(512, 512), (1920, 1080)] {
-            for samples in [1, 4] {
+        for (width, height) in [(512, 512), (1920, 1080)].into_iter().filter(|s| wanted(1, s.0)) {
+            for samples in [1, 4].into_iter().filter(|&s| wanted(2, usize::from(s))) {
                 let settings = Settings { width, height, samples, threads: 1 };
                 let mut picture = Rgba8::default();
                 rasterizer.draw(&scene, &settings, &mut picture);
-                let mut times: Vec<f64> = (0..15)
+                let mut times: Vec<f64> = (0..rounds)
                     .map(|_| {
-                        let start = Instant::now();
+                        let start = cpu();
                         rasterizer.draw(&scene, &settings, &mut picture);
-                        start.elapsed().as_secs_f64() * 1e3
+                        cpu() - start
                     })
                     .collect();
                 times.sort_by(f64::total_cmp);
-                println!("{n:9}  {width:4}×{height:<4}  {samples:7}  {:8.2}", times[7]);
+                println!(
+                    "{n:9}  {width:4}×{height:<4}  {samples:7}  {:6.2}  {:8.2}",
+                    times[rounds / 2],
+                    times[0]
+                );
             }
         }
     }

@@ -140,7 +140,7 @@ pub fn gltf(
     let new: Vec<gltf::NewClip> = ready
         .iter()
         .enumerate()
-        .map(|(i, c)| gltf::NewClip { clip: &c.0, short: &c.1, replaces: new((i, c)) })
+        .map(|(i, c)| gltf::NewClip { clip: &c.0, short: &c.1, replaces: new((i, c)), carried: None })
         .collect();
     let (out, notes) = match own {
         Some(source) => {

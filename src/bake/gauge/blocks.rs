@@ -8,9 +8,13 @@ use crate::character::{Binding, Character};
 use crate::skeleton::BoneId;
 use crate::skin::Weights;
 use glam::{Affine3A, Mat3A, Vec3, Vec3A};
+use std::ops::Range;
 
 /// Vertices a box, at most.
 const FULL: usize = 32;
+
+/// Blocks a group, at most.
+const GROUP: usize = 12;
 
 /// What rounding may add to a bound, relative to it.
 const ROUNDING: f32 = 1e-5;
@@ -20,7 +24,7 @@ struct Block {
     center: Vec3A,
     half: Vec3A,
     /// Places in the skin's lists.
-    vertices: std::ops::Range<usize>,
+    vertices: Range<usize>,
     /// Palette entries that move any of them, each with its largest weight.
     bones: Vec<(u16, f32)>,
 }
@@ -35,6 +39,8 @@ pub(super) struct Skin {
     /// Influences a vertex.
     width: usize,
     blocks: Vec<Block>,
+    /// Blocks that lie together, as blocks of their own, each with those that it is made of.
+    groups: Vec<(Block, Range<usize>)>,
 }
 
 /// The farthest vertex so far: its distance squared and its index.
@@ -56,11 +62,13 @@ impl Skin {
         let strongest = |v: u32| weights.and_then(|w| w.of(v as usize).next()).map_or(0, |b| b.0);
         let mut order: Vec<u32> = (0..positions.len() as u32).collect();
         order.sort_by_key(|&v| strongest(v));
-        let mut runs = vec![];
+        let (mut runs, mut together) = (vec![], vec![]);
         let mut start = 0;
         for run in order.chunk_by_mut(|a, b| strongest(*a) == strongest(*b)) {
+            let first = runs.len();
             split(positions, run, start, &mut runs);
             start += run.len();
+            together.extend((first..runs.len()).step_by(GROUP).map(|b| b..(b + GROUP).min(runs.len())));
         }
         let width = weights.map_or(1, Weights::per_vertex);
         let of = |v: &u32| {
@@ -70,11 +78,13 @@ impl Skin {
         };
         let influences: Vec<(u16, f32)> = order.iter().flat_map(of).collect();
         let points: Vec<Vec3A> = order.iter().map(|&v| positions[v as usize].into()).collect();
-        let blocks = runs
-            .into_iter()
-            .map(|r| Block::new(r.clone(), &points[r.clone()], &influences[r.start * width..r.end * width]));
-        let blocks = blocks.collect();
-        Self { palette, points, order, influences, width, blocks }
+        let block = |r: Range<usize>| {
+            Block::new(r.clone(), &points[r.clone()], &influences[r.start * width..r.end * width])
+        };
+        let blocks: Vec<Block> = runs.into_iter().map(block).collect();
+        let whole = |g: &Range<usize>| blocks[g.start].vertices.start..blocks[g.end - 1].vertices.end;
+        let groups = together.into_iter().map(|g| (block(whole(&g)), g)).collect();
+        Self { palette, points, order, influences, width, blocks, groups }
     }
 
     /// The vertex that a difference of palettes moves farthest, if farther than `far`. The first of equals.
@@ -86,18 +96,24 @@ impl Skin {
         // Where it may be farthest, look first: what is found there rules out most others.
         bounds.clear();
         let (mut first, mut top) = (None, far.d2);
-        for (i, b) in self.blocks.iter().enumerate() {
-            let bound = b.bound(delta, &size);
+        for (i, (group, _)) in self.groups.iter().enumerate() {
+            let bound = group.bound(delta, &size);
             bounds.push(bound);
             if bound > top {
                 (first, top) = (Some(i), bound);
             }
         }
         let Some(first) = first else { return far };
-        far = self.within(&self.blocks[first], delta, far);
-        for (i, b) in self.blocks.iter().enumerate() {
-            if i != first && bounds[i] >= far.d2 && bounds[i] > 0.0 {
-                far = self.within(b, delta, far);
+        let others = (0..self.groups.len()).filter(|i| *i != first);
+        for i in std::iter::once(first).chain(others) {
+            if bounds[i] < far.d2 || bounds[i] == 0.0 {
+                continue;
+            }
+            for block in &self.blocks[self.groups[i].1.clone()] {
+                let bound = block.bound(delta, &size);
+                if bound >= far.d2 && bound > 0.0 {
+                    far = self.within(block, delta, far);
+                }
             }
         }
         far
@@ -131,7 +147,7 @@ impl Skin {
 }
 
 /// Runs of vertices that lie together; they are sorted so.
-fn split(positions: &[Vec3], run: &mut [u32], start: usize, out: &mut Vec<std::ops::Range<usize>>) {
+fn split(positions: &[Vec3], run: &mut [u32], start: usize, out: &mut Vec<Range<usize>>) {
     if run.len() <= FULL {
         return out.push(start..start + run.len());
     }
@@ -154,7 +170,7 @@ fn largest(m: &Affine3A) -> f32 {
 }
 
 impl Block {
-    fn new(vertices: std::ops::Range<usize>, points: &[Vec3A], influences: &[(u16, f32)]) -> Self {
+    fn new(vertices: Range<usize>, points: &[Vec3A], influences: &[(u16, f32)]) -> Self {
         let fold = |(lo, hi): (Vec3A, Vec3A), p: &Vec3A| (lo.min(*p), hi.max(*p));
         let (lo, hi) = points.iter().fold((Vec3A::INFINITY, Vec3A::NEG_INFINITY), fold);
         let mut bones: Vec<(u16, f32)> = vec![];

@@ -14,7 +14,7 @@ use crate::skeleton::BoneId;
 use blocks::{Far, Skin};
 use glam::{Affine3A, Vec3};
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Mutex, OnceLock};
 
 /// Which points of a character must not stray.
@@ -199,12 +199,12 @@ impl<'a> Gauge<'a> {
         parts.into_iter().fold(Worst::default(), Worst::worse)
     }
 
-    /// The worst point at each time.
-    pub fn profile(&self, a: &Clip, b: &Clip, times: &[f64]) -> Vec<Worst> {
+    /// The worst point at each time; where nothing strays by more than `floor`, a share, there may be none.
+    pub fn profile(&self, a: &Clip, b: &Clip, times: &[f64], floor: f64) -> Vec<Worst> {
         let parts = self.chunks(times.len(), |bench, range| {
             let each = range.map(|i| {
                 self.show(a, times[i], &mut bench.shown[0]);
-                self.at(b, times[i], bench, None, 0.0)
+                self.at(b, times[i], bench, None, floor)
             });
             each.collect::<Vec<_>>()
         });
@@ -224,14 +224,18 @@ impl<'a> Gauge<'a> {
         Looks { times: times.to_vec(), shown: parts.concat() }
     }
 
-    /// The worst point of a clip at any of these moments.
-    pub fn worst_of(&self, looks: &Looks, clip: &Clip) -> Worst {
-        let parts = self.chunks(looks.times.len(), |bench, range| {
-            range.fold(Worst::default(), |top, i| {
-                top.worse(self.at(clip, looks.times[i], bench, Some(&looks.shown[i]), top.share()))
-            })
+    /// How far a clip strays at most at any of these moments, as a part of what is allowed.
+    pub fn most(&self, looks: &Looks, clip: &Clip) -> f64 {
+        // What one thread found rules vertices out for all; shares are not negative, so that their bits are in order.
+        let top = AtomicU64::new(0);
+        self.chunks(looks.times.len(), |bench, range| {
+            for i in range {
+                let floor = f64::from_bits(top.load(Ordering::Relaxed));
+                let found = self.at(clip, looks.times[i], bench, Some(&looks.shown[i]), floor);
+                top.fetch_max(found.share().to_bits(), Ordering::Relaxed);
+            }
         });
-        parts.into_iter().fold(Worst::default(), Worst::worse)
+        f64::from_bits(top.into_inner())
     }
 
     /// Whether a clip strays by more than `share` of what is allowed at any of these moments.

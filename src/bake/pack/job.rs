@@ -200,7 +200,7 @@ impl Job {
     /// Straight pieces between keys at times of their own.
     fn pieces(&self, allowed: f64) -> Option<(Draft, usize)> {
         let s = &self.samples;
-        let p = pieces::fitted(s, 0.75 * allowed, false, <[f32]>::to_vec);
+        let (p, _) = pieces::fitted(s, 0.75 * allowed, &pieces::WIDER, <[f32]>::to_vec);
         let times: Vec<f64> = p.keys.iter().map(|&k| s.times[k]).collect();
         let values: Vec<f64> = p.values.chunks(s.width).flat_map(|v| self.coordinates(v)).collect();
         let error = |played: &[f64]| {

@@ -4,8 +4,9 @@ use super::values::{factor, part, seconds};
 use crate::cli::{Failure, say, say::Say};
 use sinew::bake::edit::{self, EditError, Reference, RootMotion};
 use sinew::bake::{BakeDesc, Gauge};
-use sinew::clip::Clip;
+use sinew::clip::{Clip, Target, Track};
 use sinew::io::Import;
+use sinew::io::gltf::Carried;
 use sinew::pose::Pose;
 use sinew::time::Range;
 
@@ -43,10 +44,10 @@ pub(super) struct EditArgs {
     additive: Option<String>,
     /// Keys at whole frames of this rate only, and at the clip's ends.
     #[arg(long, value_name = "N", value_parser = fps)]
-    fps: Option<f64>,
+    pub fps: Option<f64>,
     /// Move and drop no keys but those of tracks that stand still.
     #[arg(long)]
-    keep_keys: bool,
+    pub keep_keys: bool,
 }
 
 fn fps(text: &str) -> Result<f64, String> {
@@ -65,20 +66,31 @@ pub(super) struct Edited {
     pub over: Option<Pose>,
     /// It ends as it begins.
     pub cycle: bool,
+    /// What of it moves no bone.
+    pub carried: Vec<Carried>,
 }
+
+/// Stands for the first of the things that are no bones, while clips are cut and joined.
+const BEYOND: usize = usize::MAX / 2;
 
 /// The clips as they are to be baked.
 pub(super) fn edited(
     args: &EditArgs,
     import: &Import,
     chosen: &[usize],
+    beyond: &[Vec<Carried>],
     desc: &BakeDesc,
     say: &Say,
 ) -> Result<Vec<Edited>, Failure> {
     let clips = import.asset.character.clips();
+    let all: Vec<&Carried> = beyond.iter().flatten().collect();
     let mut out = vec![];
     for &c in chosen {
         let mut clip = clips[c].clone();
+        for one in beyond.get(c).into_iter().flatten() {
+            let first = BEYOND + all.iter().position(|a| a.moves_as(one)).expect("it is one of them");
+            clip.tracks.push(Track { target: Target::Weights { first }, curve: one.curve.clone() });
+        }
         if let Some(ends) = args.trim {
             clip = trimmed(&clip, ends, say)?;
         }
@@ -95,7 +107,17 @@ pub(super) fn edited(
         out = vec![(edit::concat(name, &all), None)];
     }
     let alone = out.len() == 1;
-    out.into_iter().map(|(clip, replaces)| placed(args, import, clip, replaces, desc, alone, say)).collect()
+    let one = |(mut clip, replaces): (Clip, _)| {
+        let index = |t: &Track| match t.target {
+            Target::Weights { first } => first.checked_sub(BEYOND),
+            _ => None,
+        };
+        let own = clip.tracks.iter().filter_map(|t| Some(all[index(t)?].with(t.curve.clone())));
+        let carried = own.collect();
+        clip.tracks.retain(|t| index(t).is_none());
+        Ok(Edited { carried, ..placed(args, import, clip, replaces, desc, alone, say)? })
+    };
+    out.into_iter().map(one).collect()
 }
 
 fn trimmed(clip: &Clip, [from, to]: [Option<f64>; 2], say: &Say) -> Result<Clip, Failure> {
@@ -163,7 +185,7 @@ fn placed(
         clip = edit::additive(&clip, &base).map_err(|e| refused("--additive", &e))?;
         over = Some(base);
     }
-    Ok(Edited { clip, replaces, motion, over, cycle })
+    Ok(Edited { clip, replaces, motion, over, cycle, carried: vec![] })
 }
 
 /// Ends apart by no more than this part of the tolerance are taken for the same pose.

@@ -21,7 +21,7 @@ pub(super) fn gltf(
     let pictures = import.asset.textures.iter().map(png).collect::<Result<Vec<_>, _>>()?;
     let new: Vec<gltf::NewClip> = done
         .iter()
-        .map(|d| gltf::NewClip { clip: &d.baked.clip, short: &d.baked.short, replaces: None })
+        .map(|d| gltf::NewClip { clip: &d.baked.clip, short: &d.baked.short, replaces: None, carried: None })
         .collect();
     let bad = |e: gltf::GltfError| Failure::Input(format!("{}: {e}", input.display()));
     let (out, warnings) = gltf::write(&import.asset, &pictures, &new, extras).map_err(bad)?;

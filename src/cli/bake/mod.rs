@@ -3,6 +3,7 @@
 mod clips;
 mod forms;
 mod fresh;
+mod mesh;
 mod motion;
 mod report;
 mod to;
@@ -41,12 +42,13 @@ Examples:
   sinew bake fox.glb -o fox.stl --pose-at 0.5           as it stands, for printing and sculpting
   sinew bake fox.glb -o fox.pc2 --vertices --clip Run   where each point is, frame by frame
   sinew bake fox.glb -o light.glb --influences 2
+  sinew bake fox.glb -o tiny.glb --quantize-mesh --meshopt   vertices in integers, same tolerance
   sinew bake fox.glb -o clips/{name}-{clip}.glb         each clip in a file of its own
 
 No vertex of the skin moves by more than the tolerance, at any time: vertices are compared at all keys, and between
 them until the second derivatives of the bones' motion leave no room for more. What was reached is printed and
-written into asset.extras.sinew. From glTF to glTF everything but the animations is carried through untouched. Where the bound cannot be kept, nothing is
-written and the exit code is 4.";
+written into asset.extras.sinew. From glTF to glTF everything but the animations is carried through untouched, unless
+an option says otherwise. Where the bound cannot be kept, nothing is written and the exit code is 4.";
 
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
@@ -74,7 +76,7 @@ pub struct Args {
     /// otherwise.
     #[arg(long, value_name = "bytes|keys", value_parser = fewest)]
     fewest: Option<Goal>,
-    /// Keep rotations as 32-bit floating point.
+    /// Keep rotations and morph weights as 32-bit floating point.
     #[arg(long)]
     no_quantize: bool,
     /// Worker threads; one a core by default. The result does not depend on them.
@@ -101,6 +103,7 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     let mut names = Names::new(&args.output)?;
     write::check_name(&names.example(), args.forms.endings())?;
     args.to.form(Path::new(&names.example()))?;
+    args.forms.check(args, &names.example())?;
     names.tell_apart(args.inputs.len())?;
     let many = args.inputs.len() > 1 || names.template.tells_clips();
     let (mut outcome, mut told) = (Outcome::default(), vec![]);
@@ -174,17 +177,21 @@ fn chosen(args: &Args, input: &Path, import: &Import) -> Result<Vec<usize>, Fail
         Some(one) if args.clip.is_some() => vec![one],
         _ => (0..clips.len()).collect(),
     };
-    if chosen.is_empty() && import.format == "glTF" && !to::is_rig(Path::new(&args.output)) {
+    let nothing = chosen.is_empty() && !args.forms.any();
+    if nothing && import.format == "glTF" && !to::is_rig(Path::new(&args.output)) {
         return Err(Failure::Input(format!("{}: there are no clips to bake", input.display())));
     }
     Ok(chosen)
 }
 
+fn threads(args: &Args) -> usize {
+    args.threads.map_or_else(|| std::thread::available_parallelism().map_or(1, Into::into), Into::into)
+}
+
 /// What is promised of a file's clips.
 fn desc(args: &Args, import: &Import) -> Result<(BakeDesc, f64), Failure> {
     let character = &import.asset.character;
-    let threads =
-        args.threads.map_or_else(|| std::thread::available_parallelism().map_or(1, Into::into), Into::into);
+    let threads = threads(args);
     let diagonal = Gauge::new(character, threads).diagonal();
     let pins = args.pin.iter().map(|(name, limit)| {
         let missing =
@@ -235,9 +242,9 @@ fn one(
         let message = format!("{}: {}", input.display(), f.message());
         f.with_message(message)
     };
-    let edited = clips::edited(&args.edits, import, &chosen, &desc, say).map_err(placed)?;
-    let clips: Vec<_> = edited.iter().map(|e| &e.clip).collect();
-    let limited = args.forms.limited(import, &clips, say);
+    let beyond = write::beyond(args, input, import)?;
+    let edited = clips::edited(&args.edits, import, &chosen, &beyond, &desc, say).map_err(placed)?;
+    let limited = args.forms.limited(import, &edited, say);
     let import = limited.as_ref().map_or(import, |l| &l.0);
     if let Some(report) =
         args.forms.write(args, [input, output], import, &edited, &desc, say).map_err(placed)?
@@ -246,11 +253,17 @@ fn one(
         told.push(report);
         return Ok(());
     }
+    let quantized =
+        args.forms.quantize_mesh.then(|| mesh::quantized(args, input, import, &edited, &desc, say));
+    let quantized = quantized.transpose()?;
+    let character = quantized.as_ref().map_or(&import.asset.character, |q| &q.character);
+    let mesh = quantized.as_ref().filter(|_| desc.metric == Metric::Vertices).map_or(0.0, |q| q.error);
+    let allowed = desc.tolerance - mesh;
     let bar = say.clip_progress(edited.len());
     let mut done = vec![];
     for e in &edited {
         tell_coarse_times(&e.clip, say);
-        let desc = BakeDesc { cycle: e.cycle, over: e.over.clone(), ..desc.clone() };
+        let desc = BakeDesc { tolerance: allowed, cycle: e.cycle, over: e.over.clone(), ..desc.clone() };
         let poses = AtomicUsize::new(0);
         let watch = |stage: Stage, n: usize| {
             let all = poses.fetch_add(n, Ordering::Relaxed) + n;
@@ -258,8 +271,8 @@ fn one(
             let clip = say::name(&e.clip.name);
             bar.set_message(format!("{}, {clip}: {doing}, {all} poses compared", input.display()));
         };
-        let baked = to::bake(form, &import.asset.character, &e.clip, &desc, &watch);
-        done.push(Done { edited: e, baked: baked.map_err(failure).map_err(placed)? });
+        let baked = to::bake(form, character, &e.clip, &desc, &watch);
+        done.push(Done { edited: e, baked: baked.map_err(failure).map_err(placed)?, allowed, mesh });
         bar.inc(1);
     }
     bar.finish_and_clear();
@@ -270,7 +283,10 @@ fn one(
     if let Some((_, cost)) = &limited {
         report["influences"] = cost.clone();
     }
-    write::write(args, input, output, import, &done, &report, say)?;
+    if let Some(q) = &quantized {
+        report["mesh"] = q.told.clone();
+    }
+    write::write(args, input, output, import, &done, quantized.as_ref().map(|q| &q.forms), &report, say)?;
     outcome.done += 1;
     for d in done.iter().filter(|_| !args.json) {
         say.note(&report::line(import, d, diagonal));

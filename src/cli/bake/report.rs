@@ -11,6 +11,23 @@ use sinew::io::Import;
 pub(super) struct Done<'a> {
     pub edited: &'a Edited,
     pub baked: Baked,
+    /// Metres that any point may be off; pins may less.
+    pub allowed: f64,
+    /// Metres that vertices are off besides, because they are stored in integers.
+    pub mesh: f64,
+}
+
+impl Done<'_> {
+    /// Metres that no point but pins exceeds, and those that are allowed.
+    fn error(&self) -> [f64; 2] {
+        [self.baked.report.ceiling, 1.0].map(|share| share * self.allowed + self.mesh)
+    }
+
+    /// Where the worst is a pin, how far it is off and how far it may, metres.
+    fn pin(&self) -> Option<[f64; 2]> {
+        let worst = &self.baked.report.worst;
+        (worst.spot.is_some() && worst.limit != self.allowed).then_some([worst.distance, worst.limit])
+    }
 }
 
 pub(super) fn bone_of(import: &Import, b: &Baked) -> String {
@@ -33,13 +50,16 @@ pub(super) fn line(import: &Import, done: &Done, diagonal: f64) -> String {
         r.bytes[0],
         r.bytes[1]
     );
-    if r.worst.spot.is_none() && r.ceiling == 0.0 {
+    let [error, _] = done.error();
+    if r.worst.spot.is_none() && error == 0.0 {
         return format!("{made}; nothing is off");
     }
+    let pin = done.pin().map(|p| p.map(|m| 1e3 * m));
     format!(
-        "{made}; at most {:.4} mm off ({:.4}% of the diagonal), at {:.3} s on {}",
-        1e3 * r.ceiling * r.worst.limit,
-        100.0 * r.ceiling * r.worst.limit / diagonal.max(1e-30),
+        "{made}; at most {:.4} mm off ({:.4}% of the diagonal), {} at {:.3} s on {}",
+        1e3 * error,
+        100.0 * error / diagonal.max(1e-30),
+        pin.map_or("worst".into(), |[off, may]| format!("worst a pin, by {off:.4} of {may:.4} mm,")),
         r.worst.time,
         say::name(&bone_of(import, &done.baked)),
     )
@@ -60,17 +80,21 @@ pub(super) fn report(import: &Import, done: &[Done], args: &Args, desc: &BakeDes
     };
     let clips = done.iter().map(|d| {
         let (b, r) = (&d.baked, &d.baked.report);
+        let [error, limit] = d.error();
         let mut told = json!({
             "clip": d.edited.clip.name,
-            "error": r.ceiling * r.worst.limit,
+            "error": error,
             "measured": r.worst.distance,
-            "limit": r.worst.limit,
+            "limit": limit,
             "worst": worst(import, b),
             "moments": r.moments,
             "keys": r.keys,
             "bytes": r.bytes,
             "loop": d.edited.cycle,
         });
+        if let Some([off, may]) = d.pin() {
+            told["pin"] = json!({"measured": off, "limit": may});
+        }
         if let Some(motion) = &d.edited.motion {
             told["rootMotion"] = import.asset.character.skeleton().name(motion.bone).into();
         }

@@ -5,8 +5,10 @@ use super::{Args, fresh, to};
 use crate::cli::batch::{self, Names};
 use crate::cli::{Failure, say, say::Say};
 use serde_json::{Map, Value, json};
+use sinew::io::gltf::{Carried, MeshForm};
 use sinew::io::picture::{AtomicFile, Folder};
 use sinew::io::{self, Import, gltf};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Say so before the work and not after it.
@@ -58,6 +60,7 @@ pub(super) fn write(
     output: &Path,
     import: &Import,
     done: &[Done],
+    forms: Option<&BTreeMap<usize, MeshForm>>,
     report: &Value,
     say: &Say,
 ) -> Result<(), Failure> {
@@ -80,8 +83,14 @@ pub(super) fn write(
     if folder.canonicalize().ok() != there.canonicalize().ok() {
         out.embed_pictures(Some(folder)).map_err(bad)?;
     }
+    if let Some(forms) = forms {
+        out.quantize(forms).map_err(bad)?;
+    }
     // What came packed does not grow.
-    if args.forms.meshopt || import.extensions.iter().any(|e| e == "EXT_meshopt_compression") {
+    if let Some(extension) = out.stranger().filter(|_| args.forms.meshopt) {
+        return Err(stranger("--meshopt", extension));
+    }
+    if args.forms.meshopt || import.extensions.iter().any(|e| e.ends_with("_meshopt_compression")) {
         out.compress().map_err(bad)?;
     }
     put(args, output, &out)
@@ -107,7 +116,7 @@ fn folder(input: &Path) -> &Path {
 }
 
 /// The input with other clips.
-fn rewritten(
+pub(super) fn rewritten(
     args: &Args,
     input: &Path,
     import: &Import,
@@ -122,11 +131,30 @@ fn rewritten(
             clip: &d.baked.clip,
             short: &d.baked.short,
             replaces: d.edited.replaces.filter(|_| args.motion.is_empty()),
+            carried: Some(&d.edited.carried),
         })
         .collect();
     let name = input.display().to_string();
     let change = gltf::Change { clips: &clips, extras, influences: args.forms.limits() };
     gltf::changed(&bytes, Some(folder(input)), &name, import, change).map_err(|e| bad(&e))
+}
+
+/// Bytes cannot move where more may be said of them than is known.
+pub(super) fn stranger(option: &str, extension: &str) -> Failure {
+    let message = format!(
+        "{option}: `{extension}` may say where bytes are; take it out of the file first, or leave {option} out"
+    );
+    Failure::Usage(message)
+}
+
+/// What the input's clips move beside bones.
+pub(super) fn beyond(args: &Args, input: &Path, import: &Import) -> Result<Vec<Vec<Carried>>, Failure> {
+    if !args.motion.is_empty() || !import.extensions.iter().any(|e| e == "KHR_animation_pointer") {
+        return Ok(vec![]);
+    }
+    let bad = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", input.display()));
+    let bytes = io::read_file(input).map_err(|e| bad(&e))?;
+    gltf::carried(&bytes, Some(folder(input)), &input.display().to_string()).map_err(|e| bad(&e))
 }
 
 /// What the clips' edits leave to be said.

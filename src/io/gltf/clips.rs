@@ -73,6 +73,21 @@ fn track(
     Ok(Some(Track { target, curve: curve(doc, sampler, width, shape, place, w)? }))
 }
 
+/// The keys of a sampler, of whatever width.
+pub(super) fn any_curve(doc: &Document, animation: usize, sampler: usize, place: &str) -> Result<Curve> {
+    let samplers = &doc.root.animations[animation].samplers;
+    let sampler = entry(samplers, sampler, "sampler", || format!("{place}.sampler"))?;
+    let output = entry(&doc.root.accessors, sampler.output.value(), "accessor", || place.into())?;
+    let Checked::Valid(shape) = output.type_ else {
+        return Err(value(place, "a type of values", "another word"));
+    };
+    let keys = doc.count(sampler.input.value(), place)?.max(1);
+    let each = if sampler.interpolation == Checked::Valid(Mode::CubicSpline) { 3 } else { 1 };
+    let width =
+        (output.count.0 / keys / each) as usize * doc.width(sampler.output.value(), &[shape], place)?;
+    curve(doc, sampler, width, shape, place, &mut Warnings::default())
+}
+
 fn curve(
     doc: &Document,
     sampler: &Sampler,

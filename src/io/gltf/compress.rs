@@ -1,7 +1,7 @@
-//! Buffer views packed by EXT_meshopt_compression, written: each accessor in a view of its own, packed where that is smaller.
+//! Each accessor in a view of its own: so that the rest of a view can go, and to be packed by EXT_meshopt_compression where that is smaller.
 
 use super::error::{GltfError, Result};
-use super::prune::{fallback_buffer, packing, primitives, renumber, source, view_places};
+use super::prune::{fallback_buffer, packing, primitives, renumber, source, stranger, view_places};
 use super::rewrite::Rewritten;
 use meshoptimizer_rs::codec;
 use meshoptimizer_rs::{Limits, Workspace};
@@ -9,6 +9,9 @@ use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 
 const NAME: &str = "EXT_meshopt_compression";
+
+/// Bytes of JSON that say how a view is packed.
+const SAID: usize = 140;
 
 /// What an accessor's numbers are for.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -27,6 +30,15 @@ impl Rewritten {
     /// # Errors
     /// [`GltfError`] if bytes lie beyond the file's.
     pub fn compress(&mut self) -> Result<()> {
+        let all = 0..self.json.get("bufferViews").and_then(Value::as_array).map_or(0, Vec::len) as u64;
+        self.split(&all.collect(), true)
+    }
+
+    /// Give each accessor of these views a view of its own, packed or not.
+    pub(super) fn split(&mut self, these: &BTreeSet<u64>, pack: bool) -> Result<()> {
+        if these.is_empty() || stranger(&self.json).is_some() {
+            return Ok(());
+        }
         let uses = self.uses();
         let old: Vec<Value> =
             self.json.get("bufferViews").and_then(Value::as_array).cloned().unwrap_or_default();
@@ -36,7 +48,8 @@ impl Rewritten {
             .enumerate()
             .map(|(i, a)| place(a, uses.get(&(i as u64)).copied(), &old))
             .collect();
-        let stay = self.staying(&places, &old);
+        let mut stay = self.staying(&places, &old);
+        stay.extend((0..old.len() as u64).filter(|v| !these.contains(v)));
 
         let bin = std::mem::take(&mut self.bin);
         let (mut views, mut moved, mut fallback) = (vec![], vec![0; old.len()], 0);
@@ -60,7 +73,7 @@ impl Rewritten {
             let index = match known.get(&place) {
                 Some(known) => *known,
                 None => {
-                    let view = self.packed(&bin, place, &old[place.0 as usize], &mut fallback)?;
+                    let view = self.packed(&bin, place, &old[place.0 as usize], &mut fallback, pack)?;
                     any |= packing(&view).is_some();
                     views.push(view);
                     known.insert(place, views.len() - 1);
@@ -80,11 +93,8 @@ impl Rewritten {
         }
         self.json.insert("bufferViews".into(), views.into());
         self.json.insert("buffers".into(), buffers.into());
-        for key in ["extensionsUsed", "extensionsRequired"].into_iter().filter(|_| any) {
-            let list = self.json.entry(key).or_insert(json!([]));
-            if let Some(list) = list.as_array_mut().filter(|l| !l.iter().any(|e| e == NAME)) {
-                list.push(NAME.into());
-            }
+        if any {
+            self.requires(NAME);
         }
         // Empty lists are against the specification.
         self.json.retain(|_, v| v.as_array().is_none_or(|a| !a.is_empty()));
@@ -131,6 +141,7 @@ impl Rewritten {
         (_, offset, size, count, what): Place,
         view: &Value,
         fallback: &mut u64,
+        pack: bool,
     ) -> Result<Value> {
         let stride = view.get("byteStride").and_then(Value::as_u64).map_or(size, |s| s as usize);
         let start = number(view, "byteOffset") + offset;
@@ -149,7 +160,8 @@ impl Rewritten {
         if what == Use::Vertices {
             out["byteStride"] = step.into();
         }
-        let short = encode(&tight, count, step, what).filter(|b| b.len() < tight.len());
+        let short = if pack { encode(&tight, count, step, what) } else { None };
+        let short = short.filter(|b| b.len() + SAID < tight.len());
         let Some(short) = short else {
             out["byteOffset"] = self.place(&tight).into();
             return Ok(out);

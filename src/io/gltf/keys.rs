@@ -1,9 +1,9 @@
 //! Keys of clips as glTF stores them: nodes, samplers, accessors.
 
 use super::error::{Result, value};
-use crate::clip::{Interpolation, Target, Track};
+use crate::clip::{Curve, Integers, Interpolation, Target, Track};
 use crate::io::Import;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
 /// The nodes that tracks move.
@@ -45,24 +45,22 @@ impl Places {
     }
 }
 
-/// Keys of all clips: accessors, and the bytes of those with four-byte and with two-byte numbers.
+/// Bytes, what they make up, the type of their numbers, and whether those stand for parts of 1.
+type Form = (Vec<u8>, &'static str, usize, bool);
+
+/// Keys of all clips: accessors, and the bytes of those with four-byte, with two-byte and with one-byte numbers.
 #[derive(Default)]
 pub(super) struct Keys {
-    pub parts: [Vec<u8>; 2],
+    pub parts: [Vec<u8>; 3],
     /// Each with its part.
     pub accessors: Vec<(Value, usize)>,
-    known: BTreeMap<(Vec<u8>, &'static str), usize>,
+    known: BTreeMap<Form, usize>,
 }
 
 impl Keys {
     /// A sampler of a track, whose accessors will follow `first` others. Slopes by a rule are written as numbers.
     pub fn sampler(&mut self, track: &Track, short: bool, first: usize) -> Value {
         let curve = &track.curve.with_slopes();
-        let mode = match curve.interpolation() {
-            Interpolation::Hold => "STEP",
-            Interpolation::Linear => "LINEAR",
-            Interpolation::Hermite | Interpolation::CatmullRom(_) => "CUBICSPLINE",
-        };
         let kind = match track.target {
             Target::Weights { .. } => "SCALAR",
             Target::Rotation(_) => "VEC4",
@@ -71,15 +69,45 @@ impl Keys {
         let times = increasing(curve.times());
         let input = self.floats(&times, "SCALAR", 1);
         let each = if kind == "SCALAR" { 1 } else { curve.width() };
-        let output = match short {
-            true => self.shorts(curve.values()),
-            false => self.floats(curve.values(), kind, each),
+        let form = match kind {
+            "SCALAR" => curve.integers(),
+            _ => Some(Integers { bits: 16, signed: true }),
         };
-        let mut sampler = json!({"input": first + input, "output": first + output, "interpolation": mode});
-        if mode == "LINEAR" {
-            sampler.as_object_mut().expect("an object").remove("interpolation");
-        }
+        let output = match form.filter(|_| short) {
+            Some(form) => self.integers(curve.values(), kind, each, form, true),
+            None => self.floats(curve.values(), kind, each),
+        };
+        let mut sampler = json!({"input": first + input, "output": first + output});
+        mode(curve).into_iter().for_each(|mode| sampler["interpolation"] = mode.into());
         sampler
+    }
+
+    /// A sampler of a curve whose values have the form of this accessor.
+    pub fn formed(
+        &mut self,
+        curve: &Curve,
+        form: &Value,
+        mut sampler: Map<String, Value>,
+        first: usize,
+    ) -> Value {
+        let input = self.floats(&increasing(curve.times()), "SCALAR", 1);
+        let each =
+            [("SCALAR", 1), ("VEC2", 2), ("VEC3", 3), ("VEC4", 4), ("MAT2", 4), ("MAT3", 9), ("MAT4", 16)];
+        let (kind, width) = each.into_iter().find(|e| form["type"] == e.0).unwrap_or(each[0]);
+        let (code, normalized) = (form["componentType"].as_u64().unwrap_or(5126), form["normalized"] == true);
+        let output = match code {
+            5120..=5123 => {
+                let form = Integers { bits: if code < 5122 { 8 } else { 16 }, signed: code % 2 == 0 };
+                self.integers(curve.values(), kind, width, form, normalized)
+            }
+            _ => self.floats(curve.values(), kind, width),
+        };
+        sampler
+            .extend([("input".into(), (first + input).into()), ("output".into(), (first + output).into())]);
+        if let Some(mode) = mode(curve) {
+            sampler.insert("interpolation".into(), mode.into());
+        }
+        sampler.into()
     }
 
     /// Equal lists are stored once.
@@ -92,20 +120,30 @@ impl Keys {
             // A key's time has bounds by the specification; weights may.
             (accessor["min"], accessor["max"]) = (json!([lo]), json!([hi]));
         }
-        self.put(bytes, kind, accessor, 0)
+        self.put((bytes, kind, 5126, false), accessor, 0)
     }
 
-    fn shorts(&mut self, values: &[f32]) -> usize {
-        let bytes: Vec<u8> =
-            values.iter().flat_map(|v| ((v * 32767.0).round() as i16).to_le_bytes()).collect();
-        let accessor =
-            json!({"componentType": 5122, "normalized": true, "count": values.len() / 4, "type": "VEC4"});
-        self.put(bytes, "short", accessor, 1)
+    fn integers(
+        &mut self,
+        values: &[f32],
+        kind: &'static str,
+        width: usize,
+        form: Integers,
+        normalized: bool,
+    ) -> usize {
+        let (size, unit) = (form.bits / 8, if normalized { form.unit() } else { 1.0 });
+        let number = |v: &f32| ((v * unit).round() as i32).to_le_bytes().into_iter().take(size);
+        let bytes: Vec<u8> = values.iter().flat_map(number).collect();
+        let code = 5118 + 2 * size + usize::from(!form.signed);
+        let mut accessor = json!({"componentType": code, "count": values.len() / width, "type": kind});
+        if normalized {
+            accessor["normalized"] = true.into();
+        }
+        self.put((bytes, kind, code, normalized), accessor, 3 - size)
     }
 
-    fn put(&mut self, bytes: Vec<u8>, kind: &'static str, mut accessor: Value, part: usize) -> usize {
+    fn put(&mut self, key: Form, mut accessor: Value, part: usize) -> usize {
         let next = self.accessors.len();
-        let key = (bytes, kind);
         if let Some(&known) = self.known.get(&key) {
             return known;
         }
@@ -116,6 +154,15 @@ impl Keys {
         self.known.insert(key, next);
         self.accessors.push((accessor, part));
         next
+    }
+}
+
+/// The interpolation's name, if it is not the usual.
+fn mode(curve: &Curve) -> Option<&'static str> {
+    match curve.interpolation() {
+        Interpolation::Hold => Some("STEP"),
+        Interpolation::Linear => None,
+        Interpolation::Hermite | Interpolation::CatmullRom(_) => Some("CUBICSPLINE"),
     }
 }
 

@@ -25,6 +25,7 @@ mod mounts;
 mod nodes;
 mod pictures;
 mod prune;
+mod quantize;
 mod rewrite;
 mod skins;
 mod surface;
@@ -35,7 +36,9 @@ mod warnings;
 mod wear;
 mod write;
 
+pub use carried::{Carried, carried};
 pub use error::GltfError;
+pub use quantize::{MeshForm, vertices_of};
 pub use rewrite::{Change, NewClip, Rewritten, changed};
 pub use wear::wear;
 pub use write::write;

@@ -1,14 +1,15 @@
 //! Taking accessors and views out of a file, and what is left into one buffer.
 
 use super::carried;
-use super::document::Document;
 use super::rewrite::list;
 use serde_json::{Map, Value, json};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Extensions that name accessors in places that are not known here keep every accessor alive.
-const HARMLESS: [&str; 10] = [
+const HARMLESS: [&str; 12] = [
     "KHR_animation_pointer",
+    "KHR_node_",
+    "KHR_xmp",
     "KHR_materials_",
     "KHR_texture_",
     "EXT_texture_",
@@ -51,13 +52,17 @@ pub(super) fn sampled(animations: &Value) -> Vec<u64> {
     samplers.flat_map(|s| ["input", "output"].map(|end| s[end].as_u64())).flatten().collect()
 }
 
-/// Take out accessors that only animations used, and the views that only those used.
-pub(super) fn drop_accessors(json: &mut Map<String, Value>, unused: &[u64]) {
-    let known = |e: &Value| HARMLESS.iter().any(|h| e.as_str().is_some_and(|e| e.starts_with(h)));
-    let places_known = list(json, "extensionsUsed").iter().all(known);
+/// An extension that may name accessors and views where nobody here looks for them.
+pub(super) fn stranger(json: &Map<String, Value>) -> Option<&str> {
+    let used = json.get("extensionsUsed").and_then(Value::as_array).into_iter().flatten();
+    used.filter_map(Value::as_str).find(|e| !HARMLESS.iter().any(|h| e.starts_with(h)))
+}
+
+/// Take out those of these accessors that nothing uses any more, and the views that only those used. The views that others use as well.
+pub(super) fn drop_accessors(json: &mut Map<String, Value>, unused: &[u64]) -> BTreeSet<u64> {
     let count = list(json, "accessors").len();
     let mut gone = vec![false; count];
-    if places_known {
+    if stranger(json).is_none() {
         for &i in unused {
             gone.get_mut(i as usize).into_iter().for_each(|g| *g = true);
         }
@@ -80,12 +85,15 @@ pub(super) fn drop_accessors(json: &mut Map<String, Value>, unused: &[u64]) {
     for mut a in dropped {
         view_places_of(&mut a, &mut |v| mark(&mut unused, v, true));
     }
+    let touched = unused.clone();
     view_places(json, &mut |v| mark(&mut unused, v, false));
     take(list(json, "bufferViews"), &unused);
     let new = renumbered(&unused);
     view_places(json, &mut |v| renumber(v, &new));
     // Lists that were empty or missing stay missing: empty ones are against the specification.
     json.retain(|_, v| v.as_array().is_none_or(|a| !a.is_empty()));
+    let torn = (0..new.len()).filter(|&v| touched[v] && !unused[v]);
+    torn.map(|v| new[v]).collect()
 }
 
 fn take(items: &mut Vec<Value>, gone: &[bool]) -> Vec<Value> {
@@ -159,7 +167,7 @@ pub(super) fn source(view: &mut Value) -> &mut Value {
 }
 
 /// All bytes that views name into one buffer; those that overlap go on doing so.
-pub(super) fn repack(json: &mut Map<String, Value>, doc: &Document) -> Vec<u8> {
+pub(super) fn repack<'b>(json: &mut Map<String, Value>, raw: impl Fn(usize) -> Option<&'b [u8]>) -> Vec<u8> {
     let number = |v: &Value, name: &str| v.get(name).and_then(Value::as_u64).unwrap_or(0);
     let mut wanted: BTreeMap<u64, Vec<[u64; 2]>> = BTreeMap::new();
     let mut empty = vec![];
@@ -181,7 +189,7 @@ pub(super) fn repack(json: &mut Map<String, Value>, doc: &Document) -> Vec<u8> {
                 _ => merged.push(r),
             }
         }
-        let Some(bytes) = doc.raw(buffer as usize) else { continue };
+        let Some(bytes) = raw(buffer as usize) else { continue };
         for r in merged {
             // The same place modulo 8, so that what was aligned stays so.
             while bin.len() as u64 % 8 != r[0] % 8 {

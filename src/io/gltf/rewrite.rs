@@ -1,6 +1,6 @@
 //! A glTF file with other clips: everything else is carried through, byte for byte where it is binary.
 
-use super::carried;
+use super::carried::{self, Carried};
 use super::container;
 use super::document::Document;
 use super::error::{Result, value};
@@ -24,6 +24,8 @@ pub struct NewClip<'a> {
     pub short: &'a [bool],
     /// Which of the file's animations it replaces: it keeps that one's extras and extensions.
     pub replaces: Option<usize>,
+    /// Channels that move what is no bone; those of the animation that it replaces, as they are, if none are given.
+    pub carried: Option<&'a [Carried]>,
 }
 
 /// A glTF asset in memory.
@@ -65,19 +67,29 @@ pub fn changed(
     let doc = Document::new(mend::root(parts.json, &mut w)?, parts.bin, base_dir, &mut w)?;
     let mut json: Map<String, Value> =
         serde_json::from_slice(parts.json).map_err(|e| value("the JSON", "an object", e.to_string()))?;
+    let whole = Value::Object(std::mem::take(&mut json));
+    let of = |c: &NewClip| match (c.carried, c.replaces) {
+        (Some(given), _) => Ok(given.to_vec()),
+        (None, Some(i)) => carried::of(&doc, &whole, i),
+        _ => Ok(vec![]),
+    };
+    let carried: Vec<Vec<Carried>> = clips.iter().map(of).collect::<Result<_>>()?;
+    if let Value::Object(all) = whole {
+        json = all;
+    }
     let old = json.remove("animations").unwrap_or_default();
-    // Channels that nobody here can play keep their keys.
-    json.insert("animations".into(), carried::kept(&old, clips).into());
     let mut unused = prune::sampled(&old);
     if influenced {
         unused.extend(influences::strip(&mut json));
     }
-    prune::drop_accessors(&mut json, &unused);
-    let mut out = Rewritten { bin: prune::repack(&mut json, &doc), json, ..Rewritten::default() };
+    let torn = prune::drop_accessors(&mut json, &unused);
+    let bin = prune::repack(&mut json, |buffer| doc.raw(buffer));
+    let mut out = Rewritten { bin, json, ..Rewritten::default() };
+    out.split(&torn, false)?;
     if influenced {
         influences::write(&mut out, import)?;
     }
-    out.animate(&Places::of(import), clips, &old)?;
+    out.animate(&Places::of(import), clips, &carried, &old)?;
     out.json.entry("asset").or_insert(json!({"version": "2.0"}));
     let asset =
         out.json["asset"].as_object_mut().ok_or_else(|| value("asset", "an object", "something else"))?;
@@ -181,7 +193,17 @@ impl Rewritten {
         self.with_buffer(Some(uri))
     }
 
-    fn with_buffer(&self, uri: Option<&str>) -> Vec<u8> {
+    /// Say that nobody reads this file without an extension.
+    pub(super) fn requires(&mut self, extension: &str) {
+        for key in ["extensionsUsed", "extensionsRequired"] {
+            let names = list(&mut self.json, key);
+            if !names.iter().any(|e| e == extension) {
+                names.push(extension.into());
+            }
+        }
+    }
+
+    pub(super) fn with_buffer(&self, uri: Option<&str>) -> Vec<u8> {
         let mut json = self.json.clone();
         if let Some(Value::Array(buffers)) = json.get_mut("buffers") {
             buffers[0]["byteLength"] = self.bin.len().into();
@@ -193,20 +215,28 @@ impl Rewritten {
     }
 
     /// Add the clips and their keys.
-    pub(super) fn animate(&mut self, places: &Places, clips: &[NewClip], old: &Value) -> Result<()> {
+    pub(super) fn animate(
+        &mut self,
+        places: &Places,
+        clips: &[NewClip],
+        carried: &[Vec<Carried>],
+        old: &Value,
+    ) -> Result<()> {
         let (mut keys, mut animations) = (Keys::default(), vec![]);
-        let kept = self.json.remove("animations").unwrap_or_default();
         if clips.is_empty() {
             return Ok(());
         }
         let first = list(&mut self.json, "accessors").len();
         for (c, new) in clips.iter().enumerate() {
-            let (mut animation, before) = (kept[c].clone(), new.replaces.map_or(&Value::Null, |i| &old[i]));
+            let before = new.replaces.map_or(&Value::Null, |i| &old[i]);
+            let mut animation = if before.is_object() { before.clone() } else { json!({}) };
             animation["name"] = new.clip.name.clone().into();
-            let [mut samplers, mut channels] = ["samplers", "channels"].map(|k| match animation[k].take() {
-                Value::Array(list) => list,
-                _ => vec![],
-            });
+            let (mut samplers, mut channels): (Vec<Value>, Vec<Value>) = (vec![], vec![]);
+            for one in carried.get(c).into_iter().flatten() {
+                let [channel, sampler] = one.write(&mut keys, first, samplers.len());
+                channels.push(channel);
+                samplers.push(sampler);
+            }
             for (i, track) in new.clip.tracks.iter().enumerate() {
                 let mut sampler = keys.sampler(track, new.short.get(i) == Some(&true), first);
                 for (node, path) in places.targets(&track.target)? {
@@ -244,9 +274,9 @@ impl Rewritten {
     /// Put the keys behind what is there.
     pub(super) fn append(&mut self, keys: Keys) {
         let views = list(&mut self.json, "bufferViews").len();
-        // Four-byte numbers first, so that both parts are aligned.
+        // Wider numbers first, so that all parts are aligned.
         self.bin.resize(self.bin.len().next_multiple_of(4), 0);
-        let mut view_of = [0; 2];
+        let mut view_of = [0; 3];
         let mut next = views;
         for (i, part) in keys.parts.iter().enumerate() {
             if !part.is_empty() {

@@ -101,16 +101,18 @@ impl Colors {
             return;
         }
         let codes: &mut [u32; PLANE] = (&mut self.codes[..PLANE]).try_into().expect("a tile");
-        for k in 0..n {
-            if covers(keys.0[k]) == WHOLE {
+        if keys.shift_right(12).equal(I8::splat(WHOLE as i32)).all() {
+            // Lanes that do not count repeat one that does.
+            for k in 0..8 {
                 codes[scan::place(keys.0[k])] = words.0[k] as u32;
             }
+            return;
         }
-        if !keys.shift_right(12).equal(I8::splat(WHOLE as i32)).all() {
-            for k in 0..n {
-                if covers(keys.0[k]) != WHOLE {
-                    self.put_light(keys.0[k], rgba, k);
-                }
+        for k in 0..n {
+            if covers(keys.0[k]) == WHOLE {
+                self.codes[scan::place(keys.0[k])] = words.0[k] as u32;
+            } else {
+                self.put_light(keys.0[k], rgba, k);
             }
         }
     }

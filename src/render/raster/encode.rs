@@ -169,87 +169,33 @@ fn encode_row(row: &mut [u8], planes: &Planes, start: usize) {
 
 /// Eight pixels as [`color::encode_srgb8`] does it: the same bytes, faster.
 #[inline(always)]
-pub(super) fn encode8(c: [F8; 4]) -> I8 {
+pub(super) fn encode8(mut c: [F8; 4]) -> I8 {
     let opaque = c[3].ge(F8::ONE);
-    let clear = c[3].to_bits().equal(I8::ZERO);
-    if clear.bitmask() == 0xff {
-        return I8::ZERO;
-    }
-    if (opaque | clear).bitmask() == 0xff {
-        let [r, g, b] = codes(&c);
-        return opaque & (r | g.shift_left(8) | b.shift_left(16) | I8::splat(0xff << 24));
-    }
-    let mut out = I8::ZERO;
-    for k in 0..8 {
-        let p = color::encode_srgb8([c[0].0[k], c[1].0[k], c[2].0[k], c[3].0[k]]);
-        out.0[k] = u32::from_le_bytes(p) as i32;
-    }
-    out
-}
-
-/// `255·(1.055 c^(1/2.4) − 0.055)` as a polynomial in `t = c^(1/4)`, for which it is `t^(5/3)`: interpolated at the Chebyshev
-/// nodes of 0.0031308^(1/4)…1, it is right to 5.7e-4 codes.
-const CURVE: [f32; 7] = [-15.224638, 36.101643, 345.84674, -211.41621, 159.53728, -75.77506, 15.930479];
-
-/// Codes nearer to a step than this are looked up in the exact table.
-const DOUBT: f32 = 1e-3;
-
-/// End of the straight part of the curve.
-const TOE: f32 = 0.0031308;
-
-/// `x^(1/4)` of `TOE…1`, to 6e-7: a first guess of `x^(−1/4)` from the exponent, right to 3.2 %, and three of Newton's steps. Two
-/// square roots in a row take twice as long.
-#[inline(always)]
-fn fourth_root(x: F8) -> F8 {
-    let mut y = (I8::splat(0x4f58_8000) - x.to_bits().shift_right(2)).from_bits();
-    for _ in 0..3 {
-        let y2 = y * y;
-        y = y * (x * y2 * y2 * -0.25 + 1.25);
-    }
-    x * y * (y * y)
-}
-
-/// Codes before rounding, of light within 0…1.
-#[inline(always)]
-fn curve(c: F8) -> F8 {
-    let t = fourth_root(c.max(F8::splat(TOE)));
-    let t2 = t * t;
-    let low = (t * CURVE[1] + CURVE[0]) + (t * CURVE[3] + CURVE[2]) * t2;
-    let p = low + (t2 * CURVE[6] + (t * CURVE[5] + CURVE[4])) * (t2 * t2);
-    F8::splat(TOE).ge(c).select(c * (12.92 * 255.0), p)
-}
-
-/// Mask of codes too near to a step.
-#[inline(always)]
-fn doubtful(code: F8, rounded: I8) -> I8 {
-    let off = code - rounded.to_f32();
-    (off * off).gt(F8::splat((0.5 - DOUBT) * (0.5 - DOUBT)))
-}
-
-/// The nearest sRGB codes of linear light in three channels.
-#[inline(always)]
-fn codes(c: &[F8; 4]) -> [I8; 3] {
-    let c = [c[0].clamp01(), c[1].clamp01(), c[2].clamp01()];
-    let code = [curve(c[0]), curve(c[1]), curve(c[2])];
-    let mut out = [code[0].round(), code[1].round(), code[2].round()];
-    let doubt = [doubtful(code[0], out[0]), doubtful(code[1], out[1]), doubtful(code[2], out[2])];
-    if (doubt[0] | doubt[1] | doubt[2]).any() {
-        exact(&c, &doubt, &mut out);
-    }
-    out
-}
-
-/// Replace doubtful codes by the exact ones.
-#[cold]
-#[inline(never)]
-fn exact(c: &[F8; 3], doubt: &[I8; 3], out: &mut [I8; 3]) {
-    for channel in 0..3 {
-        for k in 0..8 {
-            if doubt[channel].0[k] < 0 {
-                out[channel].0[k] = color::srgb8(c[channel].0[k]) as i32;
-            }
+    let mut alpha = I8::splat(255);
+    if !opaque.all() {
+        // Nothing is left of pixels of less than half an alpha code.
+        alpha = opaque.select_int(alpha, (c[3].clamp01() * 255.0 + 0.5).floor());
+        if !alpha.gt(I8::ZERO).any() {
+            return I8::ZERO;
         }
+        let scale = opaque.select(F8::ONE, F8::ONE / c[3]);
+        c = [c[0] * scale, c[1] * scale, c[2] * scale, c[3]];
     }
+    let steps = &*color::STEPS;
+    let [r, g, b] = [codes(c[0], steps), codes(c[1], steps), codes(c[2], steps)];
+    alpha.gt(I8::ZERO) & (r | g.shift_left(8) | b.shift_left(16) | alpha.shift_left(24))
+}
+
+/// [`color::srgb8`] of eight.
+#[inline(always)]
+fn codes(c: F8, steps: &[u32; 2048]) -> I8 {
+    let bits = c.max(F8::splat(color::DARK)).min(F8::ONE).to_bits();
+    let place = bits.shift_right(16) - I8::splat((color::DARK.to_bits() >> 16) as i32);
+    let mut code = I8::ZERO;
+    for k in 0..8 {
+        code.0[k] = steps[place.0[k] as usize & 2047] as i32;
+    }
+    (code + (bits & I8::splat(0xffff))).shift_right(16)
 }
 
 #[cfg(test)]

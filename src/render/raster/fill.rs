@@ -67,12 +67,16 @@ impl Visibility {
     #[inline(never)]
     fn clear(&mut self, blocks: u64) {
         self.touched |= blocks;
-        for b in (0..64).filter(|b| blocks >> b & 1 != 0) {
-            let first = (b / 8 * 8 * TILE + b % 8 * 8) * self.samples;
+        let (z, id) = (self.z.as_chunks_mut::<8>().0, self.id.as_chunks_mut::<8>().0);
+        let mut left = blocks;
+        while left != 0 {
+            let b = left.trailing_zeros() as usize;
+            left &= left - 1;
             for row in 0..8 {
-                let at = first + row * TILE * self.samples;
-                self.z[at..at + 8 * self.samples].fill(f32::NEG_INFINITY);
-                self.id[at..at + 8 * self.samples].fill(NONE);
+                let first = (b / 8 * TILE + row * TILE / 8 + b % 8) * self.samples;
+                for at in first..first + self.samples {
+                    (z[at], id[at]) = ([f32::NEG_INFINITY; 8], [NONE; 8]);
+                }
             }
         }
     }

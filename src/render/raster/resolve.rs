@@ -6,7 +6,7 @@ use super::colors::{Colors, Sink};
 use super::frame::{Draw, Frame, ROTATED};
 use super::merge::share_a_vertex;
 use super::scan::{self, Key, WHOLE, covers, key};
-use super::surface::{self, Shade};
+use super::surface::{self, Corners, Shade};
 use super::tile::TileScratch;
 use super::{Stats, TILE};
 use crate::math::simd::{F8, I8};
@@ -40,6 +40,16 @@ impl Area {
     }
 }
 
+/// Colours of as many batches.
+#[derive(Debug)]
+pub(super) struct Shades([[F8; 4]; BATCHES]);
+
+impl Default for Shades {
+    fn default() -> Self {
+        Self([[F8::ZERO; 4]; BATCHES])
+    }
+}
+
 /// Colour everything that is visible in a tile.
 #[inline(always)]
 pub(super) fn resolve(frame: &Frame, area: Area, sink: Sink, scratch: &mut TileScratch) {
@@ -57,7 +67,7 @@ pub(super) fn resolve(frame: &Frame, area: Area, sink: Sink, scratch: &mut TileS
 /// Shade the pixels of one triangle; leave a few to be shaded with those of others.
 #[inline(always)]
 fn chain(frame: &Frame, area: Area, k: usize, scratch: &mut TileScratch) {
-    let TileScratch { colors, stats, last_draw, entries, .. } = scratch;
+    let TileScratch { colors, stats, last_draw, entries, shades, .. } = scratch;
     let chain = entries.chains[k];
     let mut done = 0;
     if chain.count >= GROUP {
@@ -65,22 +75,21 @@ fn chain(frame: &Frame, area: Area, k: usize, scratch: &mut TileScratch) {
         let ids = [[chain.id - draw.first_triangle; 8]];
         let known = surface::corners_of(frame, draw, ids[0][0]);
         let corner = area.corner(frame);
-        let (mut keys, mut rgba) = ([I8::ZERO; BATCHES], [[F8::ZERO; 4]; BATCHES]);
         while chain.count - done >= GROUP {
             let at = (chain.first + done) as usize;
             let n = (chain.count - done).min(8 * BATCHES as u32);
-            let (n, rest) = if n % 8 >= GROUP { (n, n % 8) } else { (n & !7, 8) };
+            let n = if n % 8 >= GROUP { n } else { n & !7 };
             let count = n.div_ceil(8) as usize;
-            for i in 0..count {
-                keys[i] = I8(entries.keys[at + 8 * i..at + 8 * i + 8].try_into().expect("eight"));
+            // There is room beyond the chain's end for lanes that repeat the first.
+            let keys = &mut entries.keys[at..at + 8 * count];
+            for k in n as usize..8 * count {
+                keys[k] = keys[0];
             }
-            for k in rest as usize..8 {
-                keys[count - 1].0[k] = keys[count - 1].0[0];
-            }
-            let (keys, rgba) = (&keys[..count], &mut rgba[..count]);
-            Shade::<true> { frame, draw, ids: &ids, known: &known, keys, corner, out: rgba }.colors();
+            let (keys, out) = (keys.as_chunks::<8>().0, &mut shades.0[..count]);
+            let (ids, known, found) = (&ids, &known, &mut []);
+            Shade::<true> { frame, draw, ids, known, found, keys, corner, out }.colors();
             for i in 0..count {
-                colors.put(&keys[i], (n as usize - 8 * i).min(8), &rgba[i]);
+                colors.put(&I8(keys[i]), (n as usize - 8 * i).min(8), &shades.0[i]);
             }
             done += n;
         }
@@ -164,8 +173,9 @@ fn loose(frame: &Frame, area: Area, scratch: &mut TileScratch) {
 
 /// Evaluations of one draw.
 struct Waiting {
-    keys: [I8; BATCHES],
+    keys: [[Key; 8]; BATCHES],
     ids: [[u32; 8]; BATCHES],
+    found: [Corners; BATCHES],
     rgba: [[F8; 4]; BATCHES],
     n: usize,
 }
@@ -173,13 +183,14 @@ struct Waiting {
 impl Waiting {
     #[inline(always)]
     fn new() -> Self {
-        Self { keys: [I8::ZERO; BATCHES], ids: [[0; 8]; BATCHES], rgba: [[F8::ZERO; 4]; BATCHES], n: 0 }
+        let (found, rgba) = ([Corners::NONE; BATCHES], [[F8::ZERO; 4]; BATCHES]);
+        Self { keys: [[0; 8]; BATCHES], ids: [[0; 8]; BATCHES], found, rgba, n: 0 }
     }
 
     #[inline(always)]
     fn push(&mut self, key: Key, id: u32) {
         let (batch, lane) = (self.n / 8 % BATCHES, self.n % 8);
-        (self.keys[batch].0[lane], self.ids[batch][lane]) = (key, id);
+        (self.keys[batch][lane], self.ids[batch][lane]) = (key, id);
         self.n += 1;
     }
 
@@ -187,7 +198,7 @@ impl Waiting {
     #[inline(always)]
     fn take(&mut self, keys: &[Key], ids: &[u32]) {
         let batch = self.n / 8 % BATCHES;
-        self.keys[batch] = I8(keys[..8].try_into().expect("eight"));
+        self.keys[batch] = keys[..8].try_into().expect("eight");
         self.ids[batch] = ids[..8].try_into().expect("eight");
         self.n += 8;
     }
@@ -197,7 +208,7 @@ impl Waiting {
     fn shade(&mut self, frame: &Frame, draw: &Draw, area: Area, colors: &mut Colors) {
         let batches = self.colors(frame, draw, area);
         for i in 0..batches {
-            colors.put(&self.keys[i], (self.n - 8 * i).min(8), &self.rgba[i]);
+            colors.put(&I8(self.keys[i]), (self.n - 8 * i).min(8), &self.rgba[i]);
         }
         self.n = 0;
     }
@@ -208,7 +219,7 @@ impl Waiting {
         let batches = self.n.div_ceil(8).min(BATCHES);
         for k in self.n..8 * batches {
             let (batch, lane) = (k / 8, k % 8);
-            self.keys[batch].0[lane] = self.keys[batch].0[0];
+            self.keys[batch][lane] = self.keys[batch][0];
             self.ids[batch][lane] = self.ids[batch][0];
         }
         for ids in &mut self.ids[..batches] {
@@ -217,8 +228,8 @@ impl Waiting {
             }
         }
         let (keys, ids, out) = (&self.keys[..batches], &self.ids[..batches], &mut self.rgba[..batches]);
-        let (known, corner) = (&[Vec4::ZERO; 3], area.corner(frame));
-        Shade::<false> { frame, draw, ids, known, keys, corner, out }.colors();
+        let (known, corner, found) = (&[Vec4::ZERO; 3], area.corner(frame), &mut self.found[..batches]);
+        Shade::<false> { frame, draw, ids, known, found, keys, corner, out }.colors();
         batches
     }
 }

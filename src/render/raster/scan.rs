@@ -226,14 +226,15 @@ fn load(ids: &[u32]) -> I8 {
 #[inline(always)]
 fn pixels(ids: &[u32]) -> (I8, u32) {
     let ids: &[[u32; 4]; 8] = ids[..32].as_chunks::<4>().0.try_into().expect("eight pixels");
-    let (mut row, mut torn) = (I8::ZERO, 0);
-    for k in 0..8 {
-        let [a, b, c, d] = ids[k];
-        let differ = (a ^ b | a ^ c | a ^ d) != 0;
-        row.0[k] = if differ { NONE as i32 } else { a as i32 };
-        torn |= (differ as u32) << k;
+    let mut by_sample = [I8::ZERO; 4];
+    for s in 0..4 {
+        for k in 0..8 {
+            by_sample[s].0[k] = ids[k][s] as i32;
+        }
     }
-    (row, torn)
+    let [a, b, c, d] = by_sample;
+    let same = a.equal(b) & a.equal(c) & a.equal(d);
+    (same.select_int(a, I8::splat(NONE as i32)), !same.bitmask() & 0xff)
 }
 
 /// A pixel with more than one triangle, or with an empty part: the triangle if one stands for all, else nothing, and what is to

@@ -32,7 +32,19 @@ pub(super) struct Bins {
     pub setups: Vec<Setup>,
     pub tiles: Vec<TileBin>,
     pub stats: Stats,
+    corners: Vec<Corners>,
 }
+
+/// Coordinates of the three corners of eight triangles.
+#[derive(Clone, Copy, Debug)]
+struct Corners {
+    x: [I8; 3],
+    y: [I8; 3],
+}
+
+/// Corners are looked up for so many groups of eight at a time, through memory: what is computed right from single numbers becomes
+/// vector instructions in parts only.
+const GROUPS: usize = 32;
 
 #[derive(Debug, Default)]
 pub(super) struct TileBin {
@@ -137,12 +149,11 @@ struct Share<'a> {
     to: u32,
 }
 
-/// Eight triangles: coordinates of their three corners, and which lanes are still of interest.
+/// Eight triangles, and the first and last pixels of their bounds.
 struct Group<'a> {
     tris: &'a [[u32; 3]; 8],
     first: u32,
-    x: [I8; 3],
-    y: [I8; 3],
+    corners: &'a Corners,
     lo: [I8; 2],
     hi: [I8; 2],
 }
@@ -175,23 +186,29 @@ impl Kernel for Share<'_> {
         let n = self.draw.object.positions.len();
         let xy = &self.vertices.xy[self.draw.first_vertex..][..n];
         let mut id = self.from;
-        let (groups, rest) = list.as_chunks::<8>();
-        for tris in groups {
-            self.group(tris, 0xff, id, xy);
-            id += 8;
+        let mut corners = std::mem::take(&mut self.bins.corners);
+        corners.resize(GROUPS, Corners { x: [I8::ZERO; 3], y: [I8::ZERO; 3] });
+        for chunk in list.chunks(8 * GROUPS) {
+            look_up(chunk, xy, &mut corners);
+            let (groups, rest) = chunk.as_chunks::<8>();
+            for (tris, corners) in groups.iter().zip(&corners) {
+                self.group(tris, 0xff, id, corners);
+                id += 8;
+            }
+            if let Some(&first) = rest.first() {
+                let mut tris = [first; 8];
+                tris[..rest.len()].copy_from_slice(rest);
+                self.group(&tris, (1 << rest.len()) - 1, id, &corners[groups.len()]);
+            }
         }
-        if let Some(&first) = rest.first() {
-            let mut tris = [first; 8];
-            tris[..rest.len()].copy_from_slice(rest);
-            self.group(&tris, (1 << rest.len()) - 1, id, xy);
-        }
+        self.bins.corners = corners;
     }
 }
 
 impl Share<'_> {
     #[inline(always)]
-    fn group(&mut self, tris: &[[u32; 3]; 8], lanes: u32, first: u32, xy: &[[i32; 2]]) {
-        let (x, y) = corners(tris, xy);
+    fn group(&mut self, tris: &[[u32; 3]; 8], lanes: u32, first: u32, corners: &Corners) {
+        let Corners { x, y } = corners;
 
         // Lanes with a corner outside, or too long for 32-bit products, go one by one.
         let (lo_x, hi_x) = (x[0].min(x[1]).min(x[2]), x[0].max(x[1]).max(x[2]));
@@ -209,6 +226,10 @@ impl Share<'_> {
             (false, _) => !area.equal(I8::ZERO),
         };
         let culled = !culled.bitmask() & lanes & !slow;
+        self.bins.stats.culled += culled.count_ones() as u64;
+        if culled == lanes {
+            return;
+        }
         let reach = reach(self.frame.samples);
         let ends = |lo: I8, hi: I8, size: i32| {
             let lo = (lo + I8::splat(127 - reach)).shift_right(8).max(I8::ZERO);
@@ -218,7 +239,6 @@ impl Share<'_> {
             (ends(lo_x, hi_x, self.frame.width), ends(lo_y, hi_y, self.frame.height));
         let empty = lo_x.gt(hi_x) | lo_y.gt(hi_y);
         let missed = empty.bitmask() & lanes & !slow & !culled;
-        self.bins.stats.culled += culled.count_ones() as u64;
         self.bins.stats.missed += missed.count_ones() as u64;
 
         // What is left is drawn at once if it is small, binned if not.
@@ -227,7 +247,7 @@ impl Share<'_> {
         let wide = (hi_x - lo_x).max(hi_y - lo_y).gt(I8::splat(most - 1));
         let direct = self.draw.class == Class::Opaque;
         let large = if direct { wide.bitmask() & left } else { left };
-        let g = Group { tris, first, x, y, lo: [lo_x, lo_y], hi: [hi_x, hi_y] };
+        let g = Group { tris, first, corners, lo: [lo_x, lo_y], hi: [hi_x, hi_y] };
         if left & !large != 0 {
             self.small(&g, area, left & !large);
         }
@@ -245,8 +265,9 @@ impl Share<'_> {
         // Turn all triangles the same way round.
         let turn = I8::ZERO.gt(area);
         let pick = |a: I8, b: I8| (turn.select_int(b, a), turn.select_int(a, b));
-        let ((x1, x2), (y1, y2)) = (pick(g.x[1], g.x[2]), pick(g.y[1], g.y[2]));
-        let (x, y) = ([g.x[0], x1, x2], [g.y[0], y1, y2]);
+        let Corners { x, y } = g.corners;
+        let ((x1, x2), (y1, y2)) = (pick(x[1], x[2]), pick(y[1], y[2]));
+        let (x, y) = ([x[0], x1, x2], [y[0], y1, y2]);
         // Most triangles that are this small hold no sample, so their depths wait for the first that does.
         let mut plane: Option<Depths> = None;
 
@@ -309,6 +330,8 @@ impl Share<'_> {
                 z[c].0[k] = list[g.tris[k][c] as usize];
             }
         }
+        // Through memory, as corners go.
+        let z = std::hint::black_box(z);
         let (z1, z2) = (turn.select(z[2], z[1]), turn.select(z[1], z[2]));
         Depths { first: z[0], along: [z1 - z[0], z2 - z[0]], scale: F8::ONE / area.to_f32() }
     }
@@ -367,21 +390,16 @@ pub(super) fn oriented(
     Some(Setup { x, y, z, id, draw: d })
 }
 
-/// Corners of eight triangles, by lane.
+/// Corners of triangles, eight by eight; lanes beyond the last keep what they held.
 #[inline(always)]
-fn corners(tris: &[[u32; 3]; 8], xy: &[[i32; 2]]) -> ([I8; 3], [I8; 3]) {
-    let (mut x, mut y) = ([I8::ZERO; 3], [I8::ZERO; 3]);
-    for c in 0..3 {
-        let mut v = [[0; 2]; 8];
-        for k in 0..8 {
-            v[k] = xy[tris[k][c] as usize];
-        }
-        for k in 0..8 {
-            x[c].0[k] = v[k][0];
-            y[c].0[k] = v[k][1];
+fn look_up(tris: &[[u32; 3]], xy: &[[i32; 2]], out: &mut [Corners]) {
+    for (tris, out) in tris.chunks(8).zip(out) {
+        for (k, t) in tris.iter().enumerate() {
+            for c in 0..3 {
+                [out.x[c].0[k & 7], out.y[c].0[k & 7]] = xy[t[c] as usize];
+            }
         }
     }
-    (x, y)
 }
 
 /// The numbers of the bits that are set.

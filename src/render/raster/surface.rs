@@ -2,10 +2,12 @@
 
 use super::frame::{Class, Draw, Frame, Projector};
 use super::resolve;
+use super::scan::Key;
 use crate::math::simd::{self, F8, I8, Kernel, V8};
 use crate::render::material::{self, Points};
 use crate::render::sample::Uv;
 use crate::render::varying::{self, Slopes, Varying, corners, mix, vectors};
+use crate::scene::Object;
 use glam::Vec4;
 
 /// Points of triangles, as pixels show them.
@@ -19,8 +21,39 @@ struct Clip {
     scale: F8,
 }
 
-/// The points of triangles `ids` that pixels show; `px`, `py` from the picture's centre. `known` are the picture
-/// coordinates of the corners if there is one triangle only.
+/// Corners of the triangles that eight points lie on, looked up beforehand: through memory, as what is computed right from single
+/// numbers becomes vector instructions in parts only.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Corners {
+    at: [[u32; 8]; 3],
+    p: [V8; 3],
+    normals: [V8; 3],
+}
+
+impl Corners {
+    pub const NONE: Self = Self { at: [[0; 8]; 3], p: [V8::ZERO; 3], normals: [V8::ZERO; 3] };
+
+    /// Fill lists of the same length.
+    #[inline(always)]
+    fn look_up(object: &Object, ids: &[[u32; 8]], out: &mut [Self]) {
+        let normals = if object.normals.is_empty() { object.positions } else { object.normals };
+        for (ids, out) in ids.iter().zip(out) {
+            for k in 0..8 {
+                let t = object.mesh.triangles[ids[k] as usize];
+                for c in 0..3 {
+                    let (p, n) = (object.positions[t[c] as usize], normals[t[c] as usize]);
+                    out.at[c][k] = t[c];
+                    (out.p[c].x.0[k], out.p[c].y.0[k], out.p[c].z.0[k]) = (p.x, p.y, p.z);
+                    let to = &mut out.normals[c];
+                    (to.x.0[k], to.y.0[k], to.z.0[k]) = (n.x, n.y, n.z);
+                }
+            }
+        }
+    }
+}
+
+/// The points of triangles that pixels show; `px`, `py` from the picture's centre. If there is `ONE`, it is `id`, and `known` are the
+/// picture coordinates of its corners; if not, `found` is what has been looked up.
 ///
 /// With `cᵢ = (xᵢ − px·wᵢ, yᵢ − py·wᵢ)`, `bᵢ ∝ eᵢ = cⱼ × cₖ` (Olano and Greer 1997): no division by `w`, so corners
 /// behind the eye do no harm, and no clipped corner is ever needed.
@@ -28,17 +61,19 @@ struct Clip {
 fn seen<'a, const ONE: bool>(
     frame: &Frame,
     draw: &'a Draw,
-    ids: &[u32; 8],
+    id: u32,
     known: &[Vec4; 3],
+    found: &Corners,
     px: F8,
     py: F8,
 ) -> Seen<'a, ONE> {
     let object = draw.object;
-    let corner = corners::<ONE>(object, ids);
-    let (mut p, mut clip) = ([V8::ZERO; 3], [[F8::ZERO; 3]; 3]);
+    let corner = if ONE { corners::<true>(object, &[id; 8]) } else { found.at };
+    let normals = if ONE || object.normals.is_empty() { None } else { Some(found.normals) };
+    let (mut p, mut clip) = (found.p, [[F8::ZERO; 3]; 3]);
     for i in 0..3 {
-        p[i] = vectors::<ONE>(object.positions, &corner[i]);
         let [x, y, w] = if ONE {
+            p[i] = vectors::<true>(object.positions, &corner[i]);
             [F8::splat(known[i].x), F8::splat(known[i].y), F8::splat(known[i].w)]
         } else {
             let m = &frame.project;
@@ -58,7 +93,7 @@ fn seen<'a, const ONE: bool>(
     let scale = turned.select(-norm, norm);
     let position = mix(&b, &p);
     let view = varying::view(&frame.scene.camera, position);
-    Varying { object, corner, b, p, position, view, slopes: Clip { corners: clip, scale } }
+    Varying { object, corner, b, p, normals, position, view, slopes: Clip { corners: clip, scale } }
 }
 
 impl Slopes for Clip {
@@ -103,8 +138,10 @@ pub(super) struct Shade<'a, const ONE: bool> {
     pub ids: &'a [[u32; 8]],
     /// Its corners, by [`corners_of`], if it is one triangle.
     pub known: &'a [Vec4; 3],
+    /// Working memory as long as `ids`, if it is more than one.
+    pub found: &'a mut [Corners],
     /// Where in the tile.
-    pub keys: &'a [I8],
+    pub keys: &'a [[Key; 8]],
     /// The tile's first pixel, from the picture's centre.
     pub corner: [f32; 2],
     /// Linear light, premultiplied, and alpha.
@@ -125,10 +162,14 @@ impl<const ONE: bool> Kernel for Shade<'_, ONE> {
 
     #[inline(always)]
     fn run(self) {
-        let Self { frame, draw, ids, known, keys, corner, out } = self;
+        let Self { frame, draw, ids, known, found, keys, corner, out } = self;
+        if !ONE {
+            Corners::look_up(draw.object, ids, found);
+        }
         for (i, (keys, out)) in keys.iter().zip(out).enumerate() {
-            let [px, py] = resolve::points(corner, keys);
-            let seen = seen::<ONE>(frame, draw, &ids[if ONE { 0 } else { i }], known, px, py);
+            let [px, py] = resolve::points(corner, &I8(*keys));
+            let found = if ONE { &Corners::NONE } else { &found[i] };
+            let seen = seen::<ONE>(frame, draw, ids[0][0], known, found, px, py);
             let (c, alpha) = material::light(frame.isa, frame.scene, draw.material, &seen);
             *out = match draw.class {
                 Class::Blend => [c.x * alpha, c.y * alpha, c.z * alpha, alpha],
@@ -174,7 +215,9 @@ impl Kernel for Look<'_> {
     #[inline(always)]
     fn run(self) -> Found {
         let Self { frame, draw, ids, px, py } = self;
-        let seen = seen::<false>(frame, draw, ids, &[Vec4::ZERO; 3], px, py);
+        let mut found = [Corners::NONE];
+        Corners::look_up(draw.object, &[*ids], &mut found);
+        let seen = seen::<false>(frame, draw, ids[0], &[Vec4::ZERO; 3], &found[0], px, py);
         let normal = material::shading_normal(frame.isa, frame.scene, draw.material, &seen);
         let Uv { u, v, .. } = seen.uv(0);
         Found { normal, position: seen.position, uv: [u, v], corner: seen.corner, b: seen.b }
@@ -203,7 +246,8 @@ impl Kernel for Present<'_> {
     #[inline(always)]
     fn run(self) -> I8 {
         let known = corners_of(self.frame, self.draw, self.id);
-        let seen = seen::<true>(self.frame, self.draw, &[self.id; 8], &known, self.px, self.py);
+        let (frame, draw, found) = (self.frame, self.draw, &Corners::NONE);
+        let seen = seen::<true>(frame, draw, self.id, &known, found, self.px, self.py);
         material::present(self.frame.isa, self.frame.scene, self.draw.material, &seen)
     }
 }

@@ -5,7 +5,7 @@ use super::colors::{Colors, Sink};
 use super::encode::Target;
 use super::fill::{All, Keep, Visibility, Walk, lane_offsets};
 use super::frame::{Class, Draw, Frame};
-use super::resolve::{self, Area, LastDraw};
+use super::resolve::{self, Area, LastDraw, Shades};
 use super::scan::Entries;
 use super::setup::{Bins, Fragment};
 use super::surface::Present;
@@ -24,6 +24,7 @@ pub(super) struct TileScratch {
     pub last_draw: LastDraw,
     /// Runs of entries of one draw.
     pub runs: Vec<(u32, u32, u32)>,
+    pub shades: Shades,
 }
 
 /// The tiles of one row.

@@ -264,7 +264,7 @@ fn varying<'a, S: Slopes>(
 ) -> Varying<'a, false, S> {
     let corner = corners::<false>(object, ids);
     let p = [0, 1, 2].map(|i| vectors::<false>(object.positions, &corner[i]));
-    Varying { object, corner, b, p, position: mix(&b, &p), view, slopes }
+    Varying { object, corner, b, p, normals: None, position: mix(&b, &p), view, slopes }
 }
 
 struct OneAlpha<'a> {

@@ -52,8 +52,8 @@ pub fn write(
     let nodes = nodes(&mut out, asset, &mut warnings)?;
     let moving: Vec<(Clip, Vec<bool>)> = clips.iter().map(|c| moving(&asset.character, c)).collect();
     let clips: Vec<NewClip> =
-        moving.iter().map(|(clip, short)| NewClip { clip, short, replaces: None }).collect();
-    out.animate(&nodes, &clips, &Value::Null)?;
+        moving.iter().map(|(clip, short)| NewClip { clip, short, replaces: None, carried: None }).collect();
+    out.animate(&nodes, &clips, &[], &Value::Null)?;
     // Lists that are empty are against the specification.
     out.json.retain(|_, v| v.as_array().is_none_or(|a| !a.is_empty()));
     Ok((out, warnings))
@@ -196,7 +196,7 @@ fn node(skeleton: &Skeleton, b: BoneId, name: String) -> Value {
     node
 }
 
-fn adopt(parent: &mut Value, child: usize) {
+pub(super) fn adopt(parent: &mut Value, child: usize) {
     match parent["children"].as_array_mut() {
         Some(list) => list.push(child.into()),
         None => parent["children"] = json!([child]),
@@ -216,7 +216,7 @@ fn skin(out: &mut Rewritten, skeleton: &Skeleton, palette: &[(BoneId, Affine3A)]
 }
 
 /// Column by column, with the last row.
-fn columns(m: &Affine3A) -> [f32; 16] {
+pub(super) fn columns(m: &Affine3A) -> [f32; 16] {
     let (a, t) = (m.matrix3, m.translation);
     let column = |c: glam::Vec3A, w: f32| [c.x, c.y, c.z, w];
     let all = [column(a.x_axis, 0.0), column(a.y_axis, 0.0), column(a.z_axis, 0.0), column(t, 1.0)];
