@@ -1,5 +1,6 @@
 //! Files: opened, saved, exported, recovered; and bad ones, which say what is wrong.
 
+use super::keys::face;
 use super::person::Person;
 use super::{file, pip};
 use sinew::bake::xzx;
@@ -166,6 +167,20 @@ fn exports_hold_what_was_edited() {
     assert_eq!(all.matches("\"duration\"").count(), 8 * frames);
     for side in ["s", "sw", "w", "nw", "n", "ne", "e", "se"] {
         assert!(all.contains(&format!("\"{clip}/{side}\"")), "{side}");
+    }
+}
+
+#[test]
+fn shapes_keep_their_names() {
+    let folder = Folder::new("shapes");
+    let state = face();
+    let (asset, clips) = (&state.document.asset, state.document.to_clips());
+    let [glb, rig] = ["face.glb", "face.json"].map(|n| folder.0.join(n));
+    save::gltf(&glb, None, asset, &clips).expect("a GLB");
+    save::save(&rig, None, asset, &clips, &state.timeline()).expect("a rig");
+    for file in [glb, rig] {
+        let again = open::read(&file).expect("what was written").state();
+        assert_eq!([0, 1].map(|i| again.document.shape(i)), ["smile", "w1"], "{}", file.display());
     }
 }
 

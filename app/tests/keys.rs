@@ -213,16 +213,20 @@ fn markers_keys_and_frames_are_stepped_through() {
     assert_eq!(p.state().time, 0.0);
 }
 
-/// A face with two shapes, `w0` and `w1`.
-fn face() -> State {
+/// A face with two shapes, `smile` and one that has no name.
+pub fn face() -> State {
     let (skeleton, of) = Skeleton::new(vec![BoneDesc { length: 1.0, ..BoneDesc::new("head") }]).unwrap();
     let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
-    let shape = |by: Vec3| MorphTarget { positions: vec![by; 3], ..MorphTarget::default() };
+    let shape = |name: &str, by: Vec3| MorphTarget {
+        name: name.into(),
+        positions: vec![by; 3],
+        ..MorphTarget::default()
+    };
     let data = MeshData {
         name: "face".into(),
         positions: corners.into(),
         triangles: vec![[0, 1, 2]],
-        targets: vec![shape(Vec3::X), shape(Vec3::Y)],
+        targets: vec![shape("smile", Vec3::X), shape("", Vec3::Y)],
         ..MeshData::default()
     };
     let instance = Instance { mesh: MeshId(0), binding: Binding::Bone(of[0]), first_weight: 0 };
@@ -256,7 +260,7 @@ fn shapes_are_typed_dragged_keyed_and_taken_back() {
     assert_eq!(keys(&p), Some((vec![1.0], vec![0.0, 0.5])));
     p.key(NONE, Key::K);
     p.type_into("Frame", "0");
-    let at = p.place("shape w0").center();
+    let at = p.place("shape smile").center();
     p.drag(at, at + vec2(25.0, 0.0), true);
     let (times, values) = keys(&p).unwrap();
     assert!(times == [0.0, 1.0] && values[0] > 0.1 && values[1] == 0.5, "{times:?} {values:?}");

@@ -194,7 +194,7 @@ pub fn frozen(character: &Character, poses: &[Pose], fps: f64, name: &str) -> Ch
                 .map(|(p, b)| (*p - b.as_dvec3()).as_vec3())
                 .collect();
             let turned = d[i].0.normals.iter().zip(&first.normals).map(|(n, b)| *n - *b).collect();
-            MorphTarget { positions: moved, normals: turned, tangents: vec![] }
+            MorphTarget { positions: moved, normals: turned, ..MorphTarget::default() }
         };
         data.targets = deformed[1..].iter().map(target).collect();
         meshes.push(Mesh::new(data).expect("a mesh that was one before"));

@@ -12,6 +12,8 @@ pub struct MaterialId(pub u32);
 /// Differences that a blend shape adds at weight 1; each list is empty or has `V` entries.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct MorphTarget {
+    /// For people; empty where the file says none.
+    pub name: String,
     /// Added to positions, metres.
     pub positions: Vec<Vec3>,
     /// Added to normals before they are normalised again.

@@ -37,11 +37,10 @@ impl Bones {
             });
         }
         let rows = self.rows(state);
-        if elsewhere {
-            if let Some(row) = rows.iter().position(|(b, _)| Some(*b) == active) {
-                let middle = row as f32 * ROW - ui.available_height() / 2.0;
-                scroll = scroll.vertical_scroll_offset(middle.max(0.0));
-            }
+        let row = rows.iter().position(|(b, _)| Some(*b) == active);
+        if let Some(row) = row.filter(|_| elsewhere) {
+            let middle = row as f32 * ROW - ui.available_height() / 2.0;
+            scroll = scroll.vertical_scroll_offset(middle.max(0.0));
         }
         ui.spacing_mut().item_spacing.y = 0.0;
         let mut keyed = vec![false; state.document.skeleton().len()];

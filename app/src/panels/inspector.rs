@@ -70,7 +70,7 @@ fn shapes(ui: &mut egui::Ui, state: &State, bus: &mut Bus) {
         ui.weak(own.map_or("", |i| &c.mesh(i).name));
         egui::Grid::new(("shapes", first)).num_columns(2).show(ui, |ui| {
             for i in first..first + width {
-                let (label, mut weight) = (format!("w{i}"), weights[i]);
+                let (label, mut weight) = (state.document.shape(i), weights[i]);
                 let r =
                     number(ui, &label, format!("shape {label}"), &mut weight, 0.01, "", (f32::MIN, f32::MAX));
                 gesture(&r, "Shape", Edit::Weight(i, weight), state, bus);

@@ -1,6 +1,7 @@
 //! What is edited: clips of one asset. Everything behind an `Arc` is shared between the steps of undo.
 
 use sinew::asset::Asset;
+use sinew::character::Instance;
 use sinew::clip::{Clip, Track};
 use sinew::pose::Pose;
 use sinew::skeleton::Skeleton;
@@ -77,6 +78,14 @@ impl Document {
         self.asset.character.skeleton()
     }
 
+    /// What a weight of a pose is called: by the file, or `w3`.
+    pub fn shape(&self, i: usize) -> String {
+        let c = &self.asset.character;
+        let of = |own: &Instance| c.mesh(own).targets.get(i.checked_sub(own.first_weight)?);
+        let name = c.instances().iter().find_map(of).map(|t| t.name.clone());
+        name.filter(|n| !n.is_empty()).unwrap_or_else(|| format!("w{i}"))
+    }
+
     /// All clips as the library has them.
     pub fn to_clips(&self) -> Vec<Clip> {
         self.clips.iter().map(|c| c.to_clip()).collect()
@@ -133,7 +142,7 @@ fn same_track(a: &Track, b: &Track) -> bool {
 }
 
 /// Names of a track's numbers, as rows and key nodes say them.
-pub fn components(track: &Track) -> Vec<String> {
+pub fn components(document: &Document, track: &Track) -> Vec<String> {
     use sinew::clip::Target::{Rotation, Scale, Translation, Weights, Xzx};
     let names: &[&str] = match track.target {
         Xzx(_) => &["θ1", "θ2", "θ3"],
@@ -141,7 +150,7 @@ pub fn components(track: &Track) -> Vec<String> {
         Translation(_) => &["x", "y", "z"],
         Scale(_) => &["sx", "sy", "sz"],
         Weights { first } => {
-            return (first..first + track.curve.width()).map(|i| format!("w{i}")).collect();
+            return (first..first + track.curve.width()).map(|i| document.shape(i)).collect();
         }
     };
     names.iter().map(|n| n.to_string()).collect()

@@ -124,6 +124,7 @@ impl<'a> Source<'a> {
                 None => Ok(Vec::new()),
             };
             out.push(MorphTarget {
+                name: String::new(),
                 positions: list(target.positions.map(|i| i.value()), "POSITION")?,
                 normals: list(target.normals.map(|i| i.value()), "NORMAL")?,
                 tangents: list(target.tangents.map(|i| i.value()), "TANGENT")?,

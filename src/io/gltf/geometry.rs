@@ -150,6 +150,8 @@ impl Geometry {
         let source = Source::new(doc, primitive, place)?;
         let built = match source.fill(&mut data, w)? {
             true => {
+                let names = target_names(&doc.root.meshes[mesh]);
+                data.targets.iter_mut().zip(names).for_each(|(target, name)| target.name = name);
                 let influences = skins::influences(doc, &source, place)?;
                 let mut mode = primitive.mode;
                 if source.is_packed() {
@@ -205,4 +207,16 @@ impl Geometry {
         entry(materials, m.value(), "material", || format!("{place}.material"))?;
         Ok(MaterialId(m.value() as u32))
     }
+}
+
+/// What programs call the shapes of a mesh, in the place that they agree on: `extras.targetNames`.
+fn target_names(mesh: &::gltf::json::Mesh) -> Vec<String> {
+    #[derive(serde::Deserialize)]
+    #[serde(rename_all = "camelCase")]
+    struct Extras {
+        target_names: Vec<String>,
+    }
+    let read = |text: &str| serde_json::from_str(text).ok();
+    let extras: Option<Extras> = mesh.extras.as_ref().and_then(|e| read(e.get()));
+    extras.map_or(vec![], |e| e.target_names)
 }

@@ -82,8 +82,17 @@ fn version(value: &mut Value, warnings: &mut Warnings) -> Result<()> {
     Ok(())
 }
 
-/// Extras mean nothing to us, and some of them are not what the schema crate expects.
+/// Extras mean nothing to us but for the names of shapes, and some of them are not what the schema crate expects.
 fn strip_extras(value: &mut Value) {
+    let names = |mesh: &mut Map<String, Value>| mesh.get("extras")?.get("targetNames").cloned();
+    let names: Vec<Option<Value>> = objects(value, "meshes").map(names).collect();
+    strip_all(value);
+    for (mesh, names) in objects(value, "meshes").zip(names) {
+        names.map(|n| mesh.insert("extras".into(), json!({"targetNames": n})));
+    }
+}
+
+fn strip_all(value: &mut Value) {
     // An explicit stack: the parser bounds the depth, but a walk needs no recursion.
     let mut stack = vec![value];
     while let Some(v) = stack.pop() {

@@ -144,6 +144,9 @@ pub struct Mesh {
 #[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Target {
+    /// For people.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub name: String,
     /// `V` differences of positions, metres, or none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub positions: Vec<[f32; 3]>,

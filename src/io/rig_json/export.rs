@@ -160,7 +160,7 @@ fn mesh(
 
 fn target(t: &MorphTarget) -> document::Target {
     let list = |of: &[Vec3]| of.iter().map(|d| d.to_array()).collect();
-    document::Target { positions: list(&t.positions), normals: list(&t.normals) }
+    document::Target { name: t.name.clone(), positions: list(&t.positions), normals: list(&t.normals) }
 }
 
 fn bind(binding: &Binding, names: &[String], posed: &Posed) -> Bind {

@@ -96,7 +96,12 @@ pub fn mesh(
 
 fn target(doc: &document::Target) -> MorphTarget {
     let list = |of: &[[f32; 3]]| of.iter().map(|d| Vec3::from_array(*d)).collect();
-    MorphTarget { positions: list(&doc.positions), normals: list(&doc.normals), tangents: vec![] }
+    MorphTarget {
+        name: doc.name.clone(),
+        positions: list(&doc.positions),
+        normals: list(&doc.normals),
+        tangents: vec![],
+    }
 }
 
 fn material_id(name: &str, all: &[document::Material], place: &str) -> Result<MaterialId, RigError> {
@@ -169,6 +174,7 @@ fn split(data: MeshData, crease: f32, rows: &mut Vec<u32>) -> MeshData {
     let pick = |i: &u32| *i as usize;
     let each = |of: &[Vec3]| rows.iter().filter_map(|i| of.get(pick(i)).copied()).collect();
     let split = |t: &MorphTarget| MorphTarget {
+        name: t.name.clone(),
         positions: each(&t.positions),
         normals: each(&t.normals),
         tangents: vec![],

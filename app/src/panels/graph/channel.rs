@@ -148,7 +148,7 @@ pub(super) fn channels<'a>(state: &'a State, axis: &Axis, looks: &mut Looks) -> 
         let full = track_name(skeleton, t);
         let bone = full.rsplit_once('.').map_or(full.as_str(), |(b, _)| b);
         let unit = if matches!(t.target, Target::Xzx(_)) { 180.0 / std::f64::consts::PI } else { 1.0 };
-        for (component, name) in components(t).into_iter().enumerate() {
+        for (component, name) in components(&state.document, t).into_iter().enumerate() {
             let color = hue(component, track);
             out.push(Channel {
                 track,

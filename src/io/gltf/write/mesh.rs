@@ -57,6 +57,10 @@ impl<'a> Meshes<'a> {
         if targets > 0 {
             let rest = character.rest_pose().weights;
             json["weights"] = json!(rest[first.first_weight..first.first_weight + targets]);
+            let names: Vec<&str> = character.mesh(first).targets.iter().map(|t| &t.name[..]).collect();
+            if names.iter().any(|n| !n.is_empty()) {
+                json["extras"] = json!({"targetNames": names});
+            }
         }
         (!primitives.is_empty()).then(|| out.push("meshes", json))
     }
