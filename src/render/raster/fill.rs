@@ -57,7 +57,7 @@ impl Visibility {
     /// Clear the block of one sample.
     #[inline(always)]
     pub fn touch_at(&mut self, at: usize) {
-        let place = at / self.samples;
+        let place = at >> self.samples.trailing_zeros();
         let bit = 1 << (place / TILE / 8 * 8 + place % TILE / 8);
         if self.touched & bit == 0 {
             self.clear(bit);
