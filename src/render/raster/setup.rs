@@ -84,6 +84,13 @@ impl Bounds {
     pub fn is_empty(&self) -> bool {
         self.x[0] > self.x[1] || self.y[0] > self.y[1]
     }
+
+    /// What of them lies in the tile that starts at a pixel, from there.
+    #[inline(always)]
+    pub fn within(self, tile: [i32; 2]) -> Self {
+        let clip = |r: [i32; 2], o: i32| [(r[0] - o).max(0), (r[1] - o).min(TILE as i32 - 1)];
+        Self { x: clip(self.x, tile[0]), y: clip(self.y, tile[1]) }
+    }
 }
 
 /// How far samples lie from their pixel's centre, in 1/256 pixels.
