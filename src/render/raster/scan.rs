@@ -132,26 +132,29 @@ impl Entries {
         let first = self.chains.last().map_or(0, |c| c.first + c.count + 8);
         let (left, right) = (x[0] as usize / 8, x[1] as usize / 8);
         let most = first as usize + (y[1] - y[0] + 1) as usize * (right - left + 1) * 8 + 8;
-        self.keys.resize(self.keys.len().max(most), 0);
-        let mut at = first;
+        if self.keys.len() < most {
+            self.keys.resize(most, 0);
+        }
+        let (keys, mut at) = (&mut self.keys[..most], first as usize);
         for row in y[0] as usize..=y[1] as usize {
             for block in left..=right {
                 let place = row * TILE + 8 * block;
                 let mut mask = load(&ids[place..]).equal(I8::splat(id as i32)).bitmask();
                 while mask != 0 {
                     let k = mask.trailing_zeros();
-                    let keys: &mut [i32; 8] = (&mut self.keys[at as usize..][..8]).try_into().expect("eight");
                     // What is written beyond the run's end is overwritten by the next.
-                    *keys = (I8::splat(key(place + k as usize, WHOLE)) + I8::IOTA).0;
-                    at += (!(mask >> k)).trailing_zeros();
+                    let run = I8::splat(key(place + k as usize, WHOLE)) + I8::IOTA;
+                    keys[at..at + 8].copy_from_slice(&run.0);
+                    at += (!(mask >> k)).trailing_zeros() as usize;
                     mask &= mask + (1 << k);
                 }
             }
         }
-        if at > first {
-            self.chains.push(Chain { id, count: at - first, first, slot: 0 });
+        let count = at as u32 - first;
+        if count > 0 {
+            self.chains.push(Chain { id, count, first, slot: 0 });
         }
-        at - first
+        count
     }
 
     /// Lay out the runs by chain.
