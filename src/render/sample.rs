@@ -207,14 +207,22 @@ fn add_packed(t: &Texture, uv: &Uv, level: I8, weight: F8, sum: &mut [F8; 4]) {
         }
     }
     for j in 0..2 {
-        let (mut left, mut right) = (I8::ZERO, I8::ZERO);
-        for k in 0..8 {
-            let pair = &levels[k][at[j].0[k] as usize..][..2];
-            (left.0[k], right.0[k]) = (pair[0] as i32, pair[1] as i32);
-        }
+        let [left, right] = if same { pairs::<true>(&levels, at[j]) } else { pairs::<false>(&levels, at[j]) };
         add_squares(sum, left, weights[j][0]);
         add_squares(sum, right, weights[j][1]);
     }
+}
+
+/// Texels and their right neighbours, of one level if it is the `SAME`.
+#[inline(always)]
+fn pairs<const SAME: bool>(levels: &[&[u32]; 8], at: I8) -> [I8; 2] {
+    let (mut left, mut right) = (I8::ZERO, I8::ZERO);
+    for k in 0..8 {
+        let first = at.0[k] as u32 as usize;
+        let pair = &levels[if SAME { 0 } else { k }][first..first + 2];
+        (left.0[k], right.0[k]) = (pair[0] as i32, pair[1] as i32);
+    }
+    [left, right]
 }
 
 #[inline(always)]

@@ -5,7 +5,7 @@
 
 use super::TILE;
 use super::frame::{Frame, ROTATED};
-use super::setup::{Bounds, Setup};
+use super::setup::{Bounds, Fragment, Setup};
 use crate::math::simd::{F8, I8};
 
 /// Nothing is seen here.
@@ -54,13 +54,22 @@ impl Visibility {
         }
     }
 
-    /// Clear the block of one sample.
+    /// Samples of small triangles: nearer wins, at equal depth the triangle that was submitted first.
     #[inline(always)]
-    pub fn touch_at(&mut self, at: usize) {
-        let place = at / self.samples;
-        let bit = 1 << (place / TILE / 8 * 8 + place % TILE / 8);
-        if self.touched & bit == 0 {
-            self.clear(bit);
+    pub fn put(&mut self, fragments: &[Fragment]) {
+        let shift = self.samples.trailing_zeros();
+        let mut blocks = 0;
+        for f in fragments {
+            let place = f.place >> shift;
+            blocks |= 1u64 << (place >> 6 & 0x38 | place >> 3 & 7);
+        }
+        self.clear(blocks & !self.touched);
+        for f in fragments {
+            let at = f.place as usize;
+            let (z, id) = (&mut self.z[at], &mut self.id[at]);
+            if f.z > *z || (f.z == *z && f.id < *id) {
+                (*z, *id) = (f.z, f.id);
+            }
         }
     }
 
@@ -111,10 +120,8 @@ impl Walk {
     /// `None` where the triangle and the tile's samples do not meet.
     #[inline(always)]
     pub fn new(frame: &Frame, s: &Setup, tile: [i32; 2]) -> Option<Self> {
-        let b = Bounds::of(frame, s.x, s.y);
         let size = TILE as i32;
-        let clip = |r: [i32; 2], o: i32| [(r[0] - o).max(0), (r[1] - o).min(size - 1)];
-        let (x, y) = (clip(b.x, tile[0]), clip(b.y, tile[1]));
+        let Bounds { x, y } = Bounds::of(frame, s.x, s.y).within(tile);
         if x[0] > x[1] || y[0] > y[1] {
             return None;
         }

@@ -6,6 +6,7 @@ use super::colors::{Colors, Sink};
 use super::frame::{Draw, Frame, ROTATED};
 use super::merge::share_a_vertex;
 use super::scan::{self, Key, WHOLE, covers, key};
+use super::setup::Bins;
 use super::surface::{self, Corners, Shade};
 use super::tile::TileScratch;
 use super::{Stats, TILE};
@@ -52,11 +53,22 @@ impl Default for Shades {
 
 /// Colour everything that is visible in a tile.
 #[inline(always)]
-pub(super) fn resolve(frame: &Frame, area: Area, sink: Sink, scratch: &mut TileScratch) {
+pub(super) fn resolve(
+    frame: &Frame,
+    bins: &[Bins],
+    tile: usize,
+    area: Area,
+    sink: Sink,
+    scratch: &mut TileScratch,
+) {
     scratch.colors.start(sink, frame.samples, frame.scene.background);
     // What was found for another scene means nothing here.
     scratch.last_draw = LastDraw::default();
-    scan::scan(frame, area, scratch);
+    if frame.samples == 1 {
+        scan::look(frame, bins, tile, area, scratch);
+    } else {
+        scan::scan(frame, area, scratch);
+    }
     for k in 0..scratch.entries.chains.len() {
         chain(frame, area, k, scratch);
     }

@@ -8,6 +8,7 @@ use super::fill::NONE;
 use super::frame::Frame;
 use super::merge;
 use super::resolve::Area;
+use super::setup::{Bins, Bounds, TileBin};
 use super::tile::TileScratch;
 use crate::math::simd::I8;
 
@@ -125,6 +126,37 @@ impl Entries {
         }
     }
 
+    /// List the pixels of a rectangle that show a triangle; their number.
+    #[inline(always)]
+    fn find(&mut self, ids: &[u32], id: u32, x: [i32; 2], y: [i32; 2]) -> u32 {
+        let first = self.chains.last().map_or(0, |c| c.first + c.count + 8);
+        let (left, right) = (x[0] as usize / 8, x[1] as usize / 8);
+        let most = first as usize + (y[1] - y[0] + 1) as usize * (right - left + 1) * 8 + 8;
+        if self.keys.len() < most {
+            self.keys.resize(most, 0);
+        }
+        let (keys, mut at) = (&mut self.keys[..most], first as usize);
+        for row in y[0] as usize..=y[1] as usize {
+            for block in left..=right {
+                let place = row * TILE + 8 * block;
+                let mut mask = load(&ids[place..]).equal(I8::splat(id as i32)).bitmask();
+                while mask != 0 {
+                    let k = mask.trailing_zeros();
+                    // What is written beyond the run's end is overwritten by the next.
+                    let run = I8::splat(key(place + k as usize, WHOLE)) + I8::IOTA;
+                    keys[at..at + 8].copy_from_slice(&run.0);
+                    at += (!(mask >> k)).trailing_zeros() as usize;
+                    mask &= mask + (1 << k);
+                }
+            }
+        }
+        let count = at as u32 - first;
+        if count > 0 {
+            self.chains.push(Chain { id, count, first, slot: 0 });
+        }
+        count
+    }
+
     /// Lay out the runs by chain.
     #[inline(always)]
     fn sort(&mut self) {
@@ -147,7 +179,38 @@ impl Entries {
     }
 }
 
-/// Find what has to be shaded in a tile.
+/// Find what has to be shaded in a tile at one sample a pixel: every triangle is looked for where it can be, which takes a third of the
+/// time of sorting what is seen.
+#[inline(always)]
+pub(super) fn look(frame: &Frame, bins: &[Bins], tile: usize, area: Area, scratch: &mut TileScratch) {
+    let TileScratch { entries, seen, stats, .. } = scratch;
+    entries.start();
+    for bins in bins {
+        let TileBin { solid, fragments, .. } = &bins.tiles[tile];
+        let setup = |s: u32| &bins.setups[s as usize];
+        // Parts of one clipped triangle follow each other.
+        for parts in solid.chunk_by(|a, b| setup(*a).id == setup(*b).id) {
+            let (mut x, mut y) = ([i32::MAX, 0], [i32::MAX, 0]);
+            for &s in parts {
+                let b = Bounds::of(frame, setup(s).x, setup(s).y).within(area.origin);
+                (x, y) = ([x[0].min(b.x[0]), x[1].max(b.x[1])], [y[0].min(b.y[0]), y[1].max(b.y[1])]);
+            }
+            if x[0] <= x[1] && y[0] <= y[1] {
+                seen.touch(x, y);
+                stats.samples += entries.find(&seen.id, setup(parts[0]).id, x, y) as u64;
+            }
+        }
+        for f in fragments {
+            if seen.id[f.place as usize] == f.id {
+                entries.loose.push(key(f.place as usize, WHOLE));
+                entries.loose_ids.push(f.id);
+                stats.samples += 1;
+            }
+        }
+    }
+}
+
+/// The same at four samples.
 #[inline(always)]
 pub(super) fn scan(frame: &Frame, area: Area, scratch: &mut TileScratch) {
     scratch.entries.start();
@@ -173,18 +236,13 @@ fn block(frame: &Frame, area: Area, [x, y]: [usize; 2], scratch: &mut TileScratc
     let mut whole = 0;
     for r in 0..8.min(area.h - y) {
         let first = (y + r) * TILE + x;
-        let row = if frame.samples == 1 {
-            load(&scratch.seen.id[first..])
-        } else {
-            let (mut row, torn) = pixels(&scratch.seen.id[4 * first..]);
-            let mut torn = torn & columns;
-            while torn != 0 {
-                let k = torn.trailing_zeros() as usize & 7;
-                torn &= torn - 1;
-                row.0[k] = pixel(frame, first + k, scratch) as i32;
-            }
-            row
-        };
+        let (mut row, torn) = pixels(&scratch.seen.id[4 * first..]);
+        let mut torn = torn & columns;
+        while torn != 0 {
+            let k = torn.trailing_zeros() as usize & 7;
+            torn &= torn - 1;
+            row.0[k] = pixel(frame, first + k, scratch) as i32;
+        }
 
         // A run starts where something is that differs from what lies left of it.
         let mut shifted = I8([NONE as i32; 8]);
@@ -209,7 +267,7 @@ fn block(frame: &Frame, area: Area, [x, y]: [usize; 2], scratch: &mut TileScratc
     for k in 0..scratch.entries.shared.len() {
         scratch.entries.push(scratch.entries.shared[k], dense);
     }
-    scratch.stats.samples += whole as u64 * frame.samples as u64;
+    scratch.stats.samples += 4 * whole as u64;
 }
 
 #[inline(always)]

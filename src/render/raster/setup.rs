@@ -84,6 +84,13 @@ impl Bounds {
     pub fn is_empty(&self) -> bool {
         self.x[0] > self.x[1] || self.y[0] > self.y[1]
     }
+
+    /// What of them lies in the tile that starts at a pixel, from there.
+    #[inline(always)]
+    pub fn within(self, tile: [i32; 2]) -> Self {
+        let clip = |r: [i32; 2], o: i32| [(r[0] - o).max(0), (r[1] - o).min(TILE as i32 - 1)];
+        Self { x: clip(self.x, tile[0]), y: clip(self.y, tile[1]) }
+    }
 }
 
 /// How far samples lie from their pixel's centre, in 1/256 pixels.
@@ -283,19 +290,27 @@ impl Share<'_> {
             e[k] = dx[k] * (py - y[a]) - dy[k] * (px - x[a]) + bias[k];
         }
         let (w, h) = (g.hi[0] - g.lo[0], g.hi[1] - g.lo[1]);
-        let (down, across) = (dx, dy);
+        let (mut columns, mut rows) = ([0; SMALL as usize], [0; SMALL as usize]);
+        for i in 0..SMALL {
+            columns[i as usize] = !I8::splat(i).gt(w).bitmask();
+            rows[i as usize] = active & !I8::splat(i).gt(h).bitmask();
+        }
+        let (mut down, mut across) = (dx, dy);
+        for k in 0..3 {
+            (down[k], across[k]) = (dx[k].shift_left(8), dy[k].shift_left(8));
+        }
         for s in 0..self.frame.samples {
             let [sx, sy] = if self.frame.samples == 1 { [0, 0] } else { ROTATED[s] };
             let start = |k: usize| e[k] + dx[k] * I8::splat(sy) - dy[k] * I8::splat(sx);
             let mut row = [start(0), start(1), start(2)];
             for j in 0..SMALL {
-                let in_rows = active & !I8::splat(j).gt(h).bitmask();
+                let in_rows = rows[j as usize];
                 if in_rows == 0 {
                     break;
                 }
                 let mut at = row;
                 for i in 0..SMALL {
-                    let in_bounds = in_rows & !I8::splat(i).gt(w).bitmask();
+                    let in_bounds = in_rows & columns[i as usize];
                     if in_bounds == 0 {
                         break;
                     }
@@ -310,11 +325,11 @@ impl Share<'_> {
                         self.emit(g, hit, z, [i, j, s as i32]);
                     }
                     for k in 0..3 {
-                        at[k] = at[k] - across[k].shift_left(8);
+                        at[k] = at[k] - across[k];
                     }
                 }
                 for k in 0..3 {
-                    row[k] = row[k] + down[k].shift_left(8);
+                    row[k] = row[k] + down[k];
                 }
             }
         }
@@ -390,13 +405,14 @@ pub(super) fn oriented(
     Some(Setup { x, y, z, id, draw: d })
 }
 
-/// Corners of triangles, eight by eight; lanes beyond the last keep what they held.
-#[inline(always)]
+/// Corners of triangles, eight by eight; lanes beyond the last keep what they held. A call, so that its few numbers stay in registers.
+#[inline(never)]
 fn look_up(tris: &[[u32; 3]], xy: &[[i32; 2]], out: &mut [Corners]) {
     for (tris, out) in tris.chunks(8).zip(out) {
         for (k, t) in tris.iter().enumerate() {
             for c in 0..3 {
-                [out.x[c].0[k & 7], out.y[c].0[k & 7]] = xy[t[c] as usize];
+                let [x, y] = xy[t[c] as usize];
+                (out.x[c].0[k & 7], out.y[c].0[k & 7]) = (x, y);
             }
         }
     }

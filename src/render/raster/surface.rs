@@ -33,8 +33,8 @@ pub(super) struct Corners {
 impl Corners {
     pub const NONE: Self = Self { at: [[0; 8]; 3], p: [V8::ZERO; 3], normals: [V8::ZERO; 3] };
 
-    /// Fill lists of the same length.
-    #[inline(always)]
+    /// Fill lists of the same length. A call, so that its few numbers stay in registers.
+    #[inline(never)]
     fn look_up(object: &Object, ids: &[[u32; 8]], out: &mut [Self]) {
         let normals = if object.normals.is_empty() { object.positions } else { object.normals };
         for (ids, out) in ids.iter().zip(out) {

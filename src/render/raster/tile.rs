@@ -7,7 +7,7 @@ use super::fill::{All, Keep, Visibility, Walk, lane_offsets};
 use super::frame::{Class, Draw, Frame};
 use super::resolve::{self, Area, LastDraw, Shades};
 use super::scan::Entries;
-use super::setup::{Bins, Fragment};
+use super::setup::Bins;
 use super::surface::Present;
 use super::{Stats, TILE};
 use crate::math::simd::{I8, Kernel};
@@ -72,9 +72,7 @@ impl Row<'_, '_> {
             for &s in &bins.tiles[index].solid {
                 self.solid(bins, s, area);
             }
-            for f in &bins.tiles[index].fragments {
-                put(&mut self.scratch.seen, f);
-            }
+            self.scratch.seen.put(&bins.tiles[index].fragments);
         }
         if self.target.write_ids(frame, area, &self.scratch.seen) {
             return;
@@ -84,10 +82,10 @@ impl Row<'_, '_> {
         let transparent = self.bins.iter().any(|b| !b.tiles[index].blend.is_empty());
         if !transparent {
             let sink = self.target.sink();
-            resolve::resolve(frame, area, sink, self.scratch);
+            resolve::resolve(frame, self.bins, index, area, sink, self.scratch);
             return self.target.write(to, w, &self.scratch.colors);
         }
-        resolve::resolve(frame, area, Sink::Layers, self.scratch);
+        resolve::resolve(frame, self.bins, index, area, Sink::Layers, self.scratch);
         blend::blend(frame, self.bins, index, area, self.scratch);
         self.scratch.colors.average();
         self.target.write_planes(to, w, &self.scratch.colors.planes);
@@ -125,16 +123,5 @@ impl Keep for Textured<'_> {
         let px = ox + (corner[0] + (place % TILE) as f32);
         let py = oy + (corner[1] + (place / TILE) as f32);
         wins & Present { frame, draw, id, px, py }.mask()
-    }
-}
-
-/// A sample of a small triangle into the buffer.
-#[inline(always)]
-fn put(seen: &mut Visibility, f: &Fragment) {
-    let at = f.place as usize;
-    seen.touch_at(at);
-    let (z, id) = (&mut seen.z[at], &mut seen.id[at]);
-    if f.z > *z || (f.z == *z && f.id < *id) {
-        (*z, *id) = (f.z, f.id);
     }
 }
