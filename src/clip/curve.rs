@@ -252,7 +252,8 @@ impl Curve {
         let keys = &self.times[..];
         let [first, last] = [keys[0], keys[keys.len() - 1]];
         // Most keys are equally far apart.
-        let guess = ((t - first) / (last - first) * (keys.len() - 1) as f64) as usize + 1;
+        let guess = ((t - first) / (last - first) * (keys.len() - 1) as f64) as usize;
+        let guess = guess.saturating_add(1);
         let hit = guess < keys.len() && keys[guess - 1] <= t && t < keys[guess];
         if hit { guess } else { keys.partition_point(|&k| k <= t) }
     }
