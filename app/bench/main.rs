@@ -205,6 +205,6 @@ fn playing(size: egui::Vec2) {
 
 fn main() {
     dope();
-    // The window of that size, and the picture of that size.
-    [vec2(1280.0, 720.0), vec2(2020.0, 1292.0)].into_iter().for_each(playing);
+    // The window of that size, and about the picture of that size.
+    [vec2(1280.0, 720.0), vec2(2002.0, 1314.0)].into_iter().for_each(playing);
 }

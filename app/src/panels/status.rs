@@ -2,11 +2,17 @@
 
 use crate::Bus;
 use crate::state::{Command, Quality, State, View};
-use crate::viewport::Viewport;
+use crate::viewport::{Cost, Viewport};
 
 /// The line.
 #[derive(Default)]
-pub struct Status {}
+pub struct Status {
+    cost: Cost,
+    since: f64,
+}
+
+/// Seconds that numbers stand while a clip plays: long enough to be read.
+const STAND: f64 = 0.25;
 
 impl Status {
     /// Draw it.
@@ -14,7 +20,11 @@ impl Status {
         ui.horizontal(|ui| {
             quality(ui, state, bus);
             ui.separator();
-            let c = viewport.cost;
+            let now = ui.input(|i| i.time);
+            if state.playback.playing.is_none() || now - self.since >= STAND {
+                (self.cost, self.since) = (viewport.cost, now);
+            }
+            let c = self.cost;
             let skin = match c.vertices {
                 0 => "skin kept".into(),
                 n => format!("skin {:.2} ms, {n} vertices", c.skin_ms),

@@ -3,7 +3,7 @@
 use super::Cost;
 use super::orbit::Orbit;
 use crate::state::{BoneStyle, EditClip, Loose, Quality, State};
-use egui::{Color32, ColorImage, TextureHandle, TextureOptions};
+use egui::{Color32, ColorImage, ImageData, TextureHandle, TextureOptions};
 use glam::DVec3;
 use sinew::asset::Asset;
 use sinew::fk::Posed;
@@ -37,6 +37,7 @@ pub struct Picture {
 pub struct Layer {
     /// The picture.
     pub texture: TextureHandle,
+    image: Arc<ColorImage>,
     of: Shown,
 }
 
@@ -250,7 +251,8 @@ impl Brush<'_> {
             Some(layer) if same => layer,
             old => {
                 self.draw(&of.what);
-                Layer { texture: upload(self.ctx, self.buffer, old.map(|l| l.texture)), of }
+                let (texture, image) = upload(self.ctx, self.buffer, old.map(|l| (l.texture, l.image)));
+                Layer { texture, image, of }
             }
         }
     }
@@ -281,19 +283,29 @@ fn ms(of: std::time::Duration) -> f32 {
 }
 
 /// A picture as a texture, premultiplied; most pixels are either there or not.
-fn upload(ctx: &egui::Context, picture: &Rgba8, old: Option<TextureHandle>) -> TextureHandle {
-    let pixel = |p: &[u8]| match p[3] {
+fn upload(
+    ctx: &egui::Context,
+    picture: &Rgba8,
+    old: Option<(TextureHandle, Arc<ColorImage>)>,
+) -> (TextureHandle, Arc<ColorImage>) {
+    let pixel = |p: &[u8; 4]| match p[3] {
         0 => Color32::TRANSPARENT,
         255 => Color32::from_rgb(p[0], p[1], p[2]),
         _ => Color32::from_rgba_unmultiplied(p[0], p[1], p[2], p[3]),
     };
-    let pixels = picture.data.chunks_exact(4).map(pixel).collect();
-    let image = ColorImage::new([picture.width, picture.height], pixels);
-    match old {
+    // The window has taken the picture before by now, so its memory serves again: new pages cost more than their pixels.
+    let (texture, before) = old.unzip();
+    let mut pixels = before.and_then(Arc::into_inner).map_or(vec![], |image| image.pixels);
+    pixels.clear();
+    pixels.extend(picture.data.as_chunks::<4>().0.iter().map(pixel));
+    let image = Arc::new(ColorImage::new([picture.width, picture.height], pixels));
+    let (data, options) = (ImageData::Color(image.clone()), TextureOptions::LINEAR);
+    let texture = match texture {
         Some(mut texture) => {
-            texture.set(image, TextureOptions::LINEAR);
+            texture.set(data, options);
             texture
         }
-        None => ctx.load_texture("layer", image, TextureOptions::LINEAR),
-    }
+        None => ctx.load_texture("layer", data, options),
+    };
+    (texture, image)
 }
