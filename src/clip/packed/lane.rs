@@ -196,7 +196,9 @@ fn anchors_bend(outer: i32) -> i32 {
 /// The middle place, and where the straight line is there.
 fn halved([lo, hi]: [usize; 2], [a, b]: [i32; 2]) -> (usize, i32) {
     let (len, half) = ((hi - lo) as i64, ((hi - lo) / 2) as i64);
-    let rise = (2 * (b as i64 - a as i64) * half + len).div_euclid(2 * len);
+    let apart = b as i64 - a as i64;
+    // Where both halves are as long, the length cancels out.
+    let rise = if 2 * half == len { (apart + 1) >> 1 } else { (2 * apart * half + len).div_euclid(2 * len) };
     (lo + half as usize, a.wrapping_add(rise as i32))
 }
 
