@@ -31,7 +31,8 @@ fn swing(bones: &[BoneId]) -> Clip {
 
 fn swing_at(bones: &[BoneId], rate: f64) -> Clip {
     let track = |(i, b): (usize, &BoneId)| {
-        let times: Vec<f64> = (0..=(2.0 * rate) as u32).map(|k| k as f64 / rate).collect();
+        let times: Vec<f64> =
+            (0..=(2.0 * rate) as u32).map(|k| f64::from((k as f64 / rate) as f32)).collect();
         let angle = |t: f64| ((2.0 + i as f64) * t).sin() * 0.8;
         let value = |t: &f64| Quat::from_rotation_z(angle(*t) as f32).to_array();
         let values = times.iter().flat_map(value).collect();
@@ -102,7 +103,7 @@ fn cubic_curves_are_taken_where_they_need_fewer_keys() {
         assert!(error <= few.report.ceiling * tolerance, "{error} {:?}", few.report);
     }
     // Nothing is smoothed over a jump.
-    let times = (0..60).flat_map(|k| [k as f64 / 60.0; 2]).skip(1).take(90).collect::<Vec<_>>();
+    let times = (0..60).flat_map(|k| [f64::from(k as f32 / 60.0); 2]).skip(1).take(90).collect::<Vec<_>>();
     let value = |k: usize| Quat::from_rotation_z((k as f32 * 0.1).sin() + if k >= 41 { 1.0 } else { 0.0 });
     let values = (0..90).flat_map(|k| value(k).to_array()).collect();
     let curve = Curve::new(times, values, 4, Interpolation::Linear).unwrap();

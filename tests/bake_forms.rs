@@ -173,6 +173,7 @@ fn what_a_form_has_no_place_for_is_refused() {
         ("a.glb", &["--pose-at", "0.5", "--fps", "30"], "cannot be used with"),
         ("a.glb", &["--pose-at", "nan"], "expected a time in seconds"),
         ("a.stl", &[], "ends in one of"),
+        ("{clip}.glb", &["--concat", "All"], "--concat makes one clip of all"),
     ] {
         let out = path(dir, name);
         let (code, said) = fails(&[&["bake", file, "-o", &out], options].concat());

@@ -185,12 +185,10 @@ impl<'a> Bound<'a> {
             .pins
             .iter()
             .map(|&(b, limit)| point(b.index(), g.character.skeleton().tip(b).length() as f64) / limit);
-        let worst = pins.fold(0.0, f64::max);
+        let worst = most(pins);
         let all = match g.metric {
             // The shell is measured by the Frobenius norm, which is up to √3 times as large.
-            Metric::Shell(radius) => {
-                (0..frames.len()).map(|b| point(b, 3.0_f64.sqrt() * radius)).fold(0.0, f64::max)
-            }
+            Metric::Shell(radius) => most((0..frames.len()).map(|b| point(b, 3.0_f64.sqrt() * radius))),
             Metric::Vertices => {
                 let morphs: Vec<Pair> = self.morphs(ends, h);
                 let of = |r: &Reach| {
@@ -200,11 +198,10 @@ impl<'a> Bound<'a> {
                     let x = Jet::constant(r.radius) + stretch * m.b;
                     (d_origin + d_linear * x + linear * stretch * m.between).bend
                 };
-                self.reach.iter().map(of).fold(0.0, f64::max)
+                most(self.reach.iter().map(of))
             }
         };
-        let share = worst.max(all / g.limit);
-        if share.is_nan() { f64::INFINITY } else { share }
+        worst.max(all / g.limit)
     }
 
     /// Linear part and translation of a bone against its parent.
@@ -269,6 +266,11 @@ impl<'a> Bound<'a> {
         };
         c.instances().iter().map(of).collect()
     }
+}
+
+/// The largest; infinite where one of them is not known, as what is infinite makes no number times zero.
+fn most(bounds: impl Iterator<Item = f64>) -> f64 {
+    bounds.fold(0.0, |top, b| if b.is_nan() { f64::INFINITY } else { top.max(b) })
 }
 
 /// How a rotation runs over a span.
@@ -398,6 +400,11 @@ fn pair(
 /// Second derivatives of up to four components.
 fn bend_at(curve: &Curve, t: f64) -> [f64; 4] {
     std::array::from_fn(|k| if k < curve.width() { curve.bend_at(t, k) } else { 0.0 })
+}
+
+/// Whether a curve changes at once anywhere.
+pub(super) fn has_jumps(curve: &Curve) -> bool {
+    !jumps(curve).is_empty()
 }
 
 fn jumps(curve: &Curve) -> Vec<f64> {

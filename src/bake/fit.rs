@@ -91,7 +91,13 @@ impl Samples {
     }
 
     fn spread(&mut self, curve: &Curve, from: f64, to: f64, steps: usize) {
-        (1..steps).for_each(|i| self.push(curve, from + (to - from) * i as f64 / steps as f64));
+        for i in 1..steps {
+            // Keys may come to stand here, and files hold their times in single precision.
+            let t = (from + (to - from) * i as f64 / steps as f64) as f32 as f64;
+            if t < to && self.times.last().is_none_or(|last| *last < t) {
+                self.push(curve, t);
+            }
+        }
     }
 
     fn push(&mut self, curve: &Curve, t: f64) {

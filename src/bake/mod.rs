@@ -206,7 +206,8 @@ const LITTLE: f64 = 1.06;
 /// Ends of a loop that agree to this part of their track, or radians, are made equal.
 const SEAM: f64 = 1e-3;
 
-/// Find few keys that move the character as `clip` does.
+/// Find few keys that move the character as `clip` does. They stand at times that a file holds, in single precision; what the rounding of
+/// times costs is part of the bound, but for jumps, which are compared at the rounded time.
 ///
 /// # Errors
 /// [`BakeError`]: a tolerance that is none, one that is finer than single precision or than frames allow, or a clip without an end.
@@ -243,6 +244,9 @@ fn bake_from(
     desc: &BakeDesc,
     watch: Watch,
 ) -> Result<Baked, BakeError> {
+    // Keys stand at times that a file can hold. Where a clip jumps, it is meant to jump then.
+    let start = &*times::in_single(start, |_| true);
+    let clip = &*times::in_single(clip, bound::has_jumps);
     let mut gauge = Gauge::of(character, desc).watched(watch);
     let mut plan = Plan::new(character, clip, start, &gauge, desc);
     gauge.enter(Stage::Search);
@@ -253,7 +257,7 @@ fn bake_from(
         let report = &mut baked.report;
         (report.worst, report.ceiling, report.moments) = (worst, ceiling, moments);
         if ceiling <= 1.0 {
-            return Ok(baked);
+            return Ok(fewer(&mut plan, &gauge, clip, baked));
         }
         // What hid between the moments of the search is searched with.
         if round < SEARCHES && worst.share() > LITTLE {
@@ -282,6 +286,22 @@ fn bake_from(
     };
     let better = Rates(USUAL.into_iter().filter(|r| *r > fps).find(keeps));
     Err(BakeError::Frames { clip: name, fps, tolerance, reached, time, better })
+}
+
+/// What was found, or all keys where they are if that is less.
+fn fewer(plan: &mut Plan, gauge: &Gauge, clip: &Clip, found: Baked) -> Baked {
+    let mut kept = plan.kept(gauge);
+    let much = |report: &Report| match plan.goal() {
+        Goal::Bytes => report.bytes[1],
+        Goal::Keys => report.keys[1],
+    };
+    if much(&kept.report) >= much(&found.report) {
+        return found;
+    }
+    let Verdict { worst, ceiling, moments, .. } = times::verify(gauge, clip, &kept.clip);
+    let report = &mut kept.report;
+    (report.worst, report.ceiling, report.moments) = (worst, ceiling, moments);
+    if ceiling <= 1.0 { kept } else { found }
 }
 
 /// Whether what is asked for means anything.

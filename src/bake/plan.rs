@@ -236,6 +236,19 @@ impl<'a> Plan<'a> {
         self.finish()
     }
 
+    /// What there is to be little of.
+    pub fn goal(&self) -> Goal {
+        self.desc.goal
+    }
+
+    /// All keys where they are, with no more bits than they need.
+    pub fn kept(&mut self, gauge: &Gauge) -> Baked {
+        let asked = std::mem::replace(&mut self.desc.keep_keys, true);
+        self.make_all(gauge, Effort::Full);
+        self.desc.keep_keys = asked;
+        self.finish()
+    }
+
     /// Nothing left out.
     pub fn untouched(&mut self) -> Baked {
         for job in &mut self.jobs {
@@ -269,6 +282,7 @@ impl<'a> Plan<'a> {
     /// A clip lasts as long as it did: the shortest track says so where what moved at the ends is gone.
     fn hold_ends(&self, clip: &mut Clip) {
         let (want, found) = (self.clip.range(), clip.range());
+        let want = crate::time::Range { start: times::single(want.start), end: times::single(want.end) };
         if clip.tracks.is_empty() {
             // One that moves nothing still lasts.
             let Some(job) = self.jobs.iter().min_by_key(|j| j.rest.len()) else { return };

@@ -2,7 +2,8 @@
 
 use super::bound::Bound;
 use super::gauge::{Gauge, Worst};
-use crate::clip::Clip;
+use crate::clip::{Clip, Curve};
+use std::borrow::Cow;
 
 /// Two motions of the same points.
 pub(super) trait Motions: Sync {
@@ -71,6 +72,27 @@ pub(super) fn knots(clips: &[&Clip]) -> Vec<f64> {
     t.sort_by(f64::total_cmp);
     t.dedup();
     t
+}
+
+/// A time as files hold it.
+pub(super) fn single(t: f64) -> f64 {
+    t as f32 as f64
+}
+
+/// The same clip with times as files hold them, for the tracks that are asked for.
+pub(super) fn in_single<'c>(clip: &'c Clip, asked: impl Fn(&Curve) -> bool) -> Cow<'c, Clip> {
+    let off = |c: &Curve| asked(c) && c.times().iter().any(|t| single(*t) != *t);
+    if !clip.tracks.iter().any(|t| off(&t.curve)) {
+        return Cow::Borrowed(clip);
+    }
+    let mut out = clip.clone();
+    for track in out.tracks.iter_mut().filter(|t| off(&t.curve)) {
+        let c = &track.curve;
+        let times = c.times().iter().map(|t| single(*t)).collect();
+        track.curve = Curve::new(times, c.values().to_vec(), c.width(), c.interpolation())
+            .expect("rounding keeps times in order");
+    }
+    Cow::Owned(out)
 }
 
 /// At most so many moments for the search: keys and the middles between them.

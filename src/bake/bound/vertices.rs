@@ -101,8 +101,7 @@ impl Bound<'_> {
                 morphed.fold(rest, |sum, (k, p)| sum + Jet::constant(*p) * self.weight(first + k, &ends, h));
             (most(0) * places).bend + c.weights * most(1).bend
         };
-        let share = changes.iter().map(of).fold(0.0, f64::max) / self.gauge.limit;
-        if share.is_nan() { f64::INFINITY } else { share }
+        super::most(changes.iter().map(of)) / self.gauge.limit
     }
 
     /// A morph weight's size.
@@ -122,6 +121,11 @@ impl Bound<'_> {
 impl Jet {
     /// What bounds both.
     fn max(self, o: Self) -> Self {
-        Self { value: self.value.max(o.value), rate: self.rate.max(o.rate), bend: self.bend.max(o.bend) }
+        let most = |a, b| super::most([a, b].into_iter());
+        Self {
+            value: most(self.value, o.value),
+            rate: most(self.rate, o.rate),
+            bend: most(self.bend, o.bend),
+        }
     }
 }

@@ -119,6 +119,13 @@ fn bend(mut keys: Keys, from: f64) -> Keys {
             keys.values[k * each + 2 * w + c] += steeper as f32;
         }
     }
+    if keys.turns {
+        // Files hold quaternions of unit length; a player's own normalising makes that the same turn.
+        for key in keys.values.chunks_mut(each) {
+            let length = key[w..2 * w].iter().map(|v| v * v).sum::<f32>().sqrt().max(1e-6);
+            key.iter_mut().for_each(|v| *v /= length);
+        }
+    }
     // What the start arrives by is what the end leaves by.
     for c in 0..w {
         keys.values[end + 2 * w + c] = sign * keys.values[2 * w + c];

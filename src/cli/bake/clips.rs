@@ -50,6 +50,13 @@ pub(super) struct EditArgs {
     pub keep_keys: bool,
 }
 
+impl EditArgs {
+    /// Whether all clips become one.
+    pub fn joins(&self) -> bool {
+        self.concat.is_some()
+    }
+}
+
 fn fps(text: &str) -> Result<f64, String> {
     let wrong = || "expected a rate from 0.01 to 10000 keys a second, as in 30".to_owned();
     text.parse::<f64>().ok().filter(|f| (0.01..=1e4).contains(f)).ok_or_else(wrong)

@@ -105,6 +105,10 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     args.to.form(Path::new(&names.example()))?;
     args.forms.check(args, &names.example())?;
     names.tell_apart(args.inputs.len())?;
+    if names.template.tells_clips() && args.edits.joins() {
+        let message = "--concat makes one clip of all, and the output's name asks for a file a clip; leave out {clip} and {index}, or --concat";
+        return Err(Failure::Usage(message.into()));
+    }
     let many = args.inputs.len() > 1 || names.template.tells_clips();
     let (mut outcome, mut told) = (Outcome::default(), vec![]);
     for input in &args.inputs {
@@ -195,7 +199,7 @@ fn desc(args: &Args, import: &Import) -> Result<(BakeDesc, f64), Failure> {
     let diagonal = Gauge::new(character, threads).diagonal();
     let pins = args.pin.iter().map(|(name, limit)| {
         let missing =
-            || Failure::Usage(format!("--pin {name}: there is no such bone; `sinew info` lists them"));
+            || Failure::Usage(format!("--pin {name}: there is no such bone; `sinew info --json` lists them"));
         Ok((character.skeleton().find(name).ok_or_else(missing)?, *limit))
     });
     let vertices = character.instances().iter().map(|i| character.mesh(i).positions.len()).sum::<usize>();

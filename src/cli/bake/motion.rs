@@ -77,7 +77,7 @@ impl Motion {
             })?;
             if map.pairs.is_empty() {
                 let message = format!(
-                    "{}: none of its bones is one of the input's; say which are with --retarget (`sinew info` lists them)",
+                    "{}: none of its bones is one of the input's; say which are with --retarget (`sinew info --json` lists them)",
                     path.display()
                 );
                 return Err(Failure::Usage(message));
