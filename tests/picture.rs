@@ -475,6 +475,20 @@ fn half_written_files_never_appear() {
 }
 
 #[test]
+fn of_files_that_belong_together_none_is_written_if_one_cannot_be() {
+    let dir = tempfile::tempdir().unwrap();
+    let [first, second, lost] = ["a.bin", "a.gltf", "nowhere/a.gltf"].map(|n| dir.path().join(n));
+    let together = |second: &std::path::Path| {
+        let files = [(first.clone(), &b"one"[..]), (second.to_owned(), b"two")];
+        AtomicFile::write_together(&files, false, Folder::MustExist)
+    };
+    assert!(together(&lost).is_err());
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+    together(&second).unwrap();
+    assert_eq!([&first, &second].map(|p| std::fs::read(p).unwrap()), [b"one", b"two"]);
+}
+
+#[test]
 fn files_are_overwritten_only_on_request() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.png");

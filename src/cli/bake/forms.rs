@@ -261,8 +261,8 @@ fn groups(import: &Import) -> Vec<u32> {
 fn with_materials(args: &Args, path: &Path, still: &Still, asset: &Asset) -> Result<(), Failure> {
     let library = path.with_extension("mtl");
     let name = library.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    put_bytes(args, &library, obj::materials(asset).as_bytes())?;
-    put_bytes(args, path, obj::write(still, asset, Some(&name)).as_bytes())
+    let (materials, shape) = (obj::materials(asset), obj::write(still, asset, Some(&name)));
+    write::put_together(args, &[(library, materials.as_bytes()), (path.to_owned(), shape.as_bytes())])
 }
 
 /// A glTF file of poses, with the look of the input.

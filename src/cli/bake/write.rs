@@ -66,10 +66,9 @@ pub(super) fn write(
 ) -> Result<(), Failure> {
     let extras = Map::from_iter([("sinew".to_owned(), report.clone())]);
     if to::is_rig(output) {
-        for (name, bytes) in fresh::rig(output, input, import, done, say)? {
-            put_bytes(args, &output.with_file_name(name), &bytes)?;
-        }
-        return Ok(());
+        let files = fresh::rig(output, input, import, done, say)?;
+        let files = files.iter().map(|(name, bytes)| (output.with_file_name(name), &bytes[..]));
+        return put_together(args, &files.collect::<Vec<_>>());
     }
     let mut out = match import.format.as_str() {
         "glTF" => rewritten(args, input, import, done, extras)?,
@@ -101,14 +100,17 @@ pub(super) fn put(args: &Args, output: &Path, out: &gltf::Rewritten) -> Result<(
     if output.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf")) {
         let bin = output.with_extension("bin");
         let uri = bin.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        put_bytes(args, &bin, &out.bin)?;
-        return put_bytes(args, output, &out.gltf(&uri));
+        return put_together(args, &[(bin, &out.bin), (output.to_owned(), &out.gltf(&uri))]);
     }
     put_bytes(args, output, &out.glb())
 }
 
 pub(super) fn put_bytes(args: &Args, path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     AtomicFile::write(path, bytes, args.force, Folder::MustExist).map_err(|e| Failure::Run(e.to_string()))
+}
+
+pub(super) fn put_together(args: &Args, files: &[(PathBuf, &[u8])]) -> Result<(), Failure> {
+    AtomicFile::write_together(files, args.force, Folder::MustExist).map_err(|e| Failure::Run(e.to_string()))
 }
 
 fn folder(input: &Path) -> &Path {

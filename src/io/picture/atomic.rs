@@ -143,6 +143,21 @@ impl AtomicFile {
         file.commit()
     }
 
+    /// The same for files that belong together: all bytes are written before the first gets its name.
+    ///
+    /// # Errors
+    /// As [`write`](Self::write).
+    pub fn write_together(files: &[(PathBuf, &[u8])], overwrite: bool, folder: Folder) -> Result<(), Error> {
+        let written = files.iter().map(|(path, bytes)| {
+            let mut file = Self::create(path, overwrite, folder)?;
+            let done = file.write_all(bytes).and_then(|()| file.flush());
+            done.map_err(|source| file.error("write", source))?;
+            Ok(file)
+        });
+        let written: Vec<Self> = written.collect::<Result<_, Error>>()?;
+        written.into_iter().try_for_each(Self::commit)
+    }
+
     /// Give the file its name.
     ///
     /// # Errors
