@@ -168,3 +168,19 @@ fn fast_turns_late_in_a_clip_keep_the_bound_at_times_that_files_hold() {
         assert!(found.share() <= baked.report.ceiling + 2e-3, "{half} {first}: {found:?} {:?}", baked.report);
     }
 }
+
+#[test]
+fn a_loop_of_half_turns_goes_round_as_it_did() {
+    let character = chain(&mut Rng::new(2));
+    // What a full turn in two arcs of half a turn comes to in single precision: the smallest parts say which way round.
+    let [w, y] = [-4.371_139e-8, -8.742_278e-8];
+    let values = vec![0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, w, 0.0, y, 0.0, -1.0];
+    let curve = Curve::new(vec![0.0, 1.0, 2.0], values, 4, Interpolation::Linear).unwrap();
+    let source =
+        Clip { name: String::new(), tracks: vec![Track { target: Target::Rotation(BoneId(3)), curve }] };
+    let desc = BakeDesc { cycle: true, ..BakeDesc::default() };
+    let baked = super::bake(&character, &source, &desc).unwrap();
+    let dense: Vec<f64> = (0..=2000).map(|k| f64::from(k) * 1e-3).collect();
+    let found = Gauge::of(&character, &desc).worst(&source, &baked.clip, &dense);
+    assert!(found.share() <= 1.0, "{found:?} {baked:?}");
+}

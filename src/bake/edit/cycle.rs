@@ -31,10 +31,10 @@ fn closed(mut keys: Keys, slack: f64) -> Keys {
                 / largest((0..n).flat_map(|k| keys.value(k).iter().copied())).max(1e-9)
         }
     };
-    if apart > slack {
+    let cubic = each > w;
+    if apart > slack || (keys.turns && !cubic && turns_back(keys.value(n - 2), &first, &last)) {
         return keys;
     }
-    let cubic = each > w;
     let sign = if flipped && cubic { -1.0 } else { 1.0 };
     let at = (n - 1) * each + if cubic { w } else { 0 };
     (0..w).for_each(|c| keys.values[at + c] = sign * first[c]);
@@ -48,6 +48,13 @@ fn closed(mut keys: Keys, slack: f64) -> Keys {
         }
     }
     keys
+}
+
+/// Whether an arc of half a turn would go the other way round if it ended in `first` instead of in `last`, which is all but the same.
+fn turns_back(from: &[f32], first: &[f32], last: &[f32]) -> bool {
+    let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| f64::from(a * b)).sum::<f64>();
+    let side = dot(from, last) * dot(last, first);
+    side * dot(from, first) < 0.0
 }
 
 fn largest(values: impl Iterator<Item = f32>) -> f64 {
