@@ -1,6 +1,6 @@
 //! One track as cubics: the fewest keys with slopes of their own, or with slopes by a rule.
 
-use super::fit::{Kind, Near, Samples};
+use super::fit::{Kind, Near, Samples, Straight};
 use crate::clip::{Curve, Interpolation};
 use crate::math::spline::{Tangents, hermite, tangent};
 use glam::Quat;
@@ -8,6 +8,9 @@ use std::ops::Range;
 
 /// The rule of fitted Catmull-Rom curves.
 const RULE: Tangents = Tangents::Notes;
+
+/// Gaps between samples that do not hold a cubic's four numbers down everywhere.
+const FEW: usize = 8;
 
 /// How strongly slopes that no sample decides are drawn to the chord's.
 const CHORD: f64 = 1e-6;
@@ -77,6 +80,21 @@ impl<'s> Piece<'s> {
     }
 }
 
+impl Piece<'_> {
+    /// Whether it leaves the straight way between two neighbouring samples, where few samples hold it.
+    fn swings(&self, s: &Samples, [a, b]: [usize; 2], tolerance: f64) -> bool {
+        let span = |i: usize| {
+            let straight = Straight::new(s.kind, s.value(i), s.value(i + 1));
+            [0.25, 0.5, 0.75].into_iter().any(|part| {
+                let u = (s.times[i] + part * (s.times[i + 1] - s.times[i]) - s.times[a]) / self.h;
+                let value: Vec<f32> = (0..s.width).map(|c| self.at(u, c) as f32).collect();
+                straight.off(part, &value) > tolerance
+            })
+        };
+        b - a < FEW && (a..b).any(span)
+    }
+}
+
 /// Parts of a track between its jumps: first and last sample.
 fn runs(s: &Samples) -> Vec<[usize; 2]> {
     let ends: Vec<usize> = (0..s.len()).filter(|&i| s.jumps(i)).chain([s.len() - 1]).collect();
@@ -113,7 +131,8 @@ fn reach(s: &Samples, from: usize, last: usize, tolerance: f64) -> (usize, Piece
     let near = Near::new(tolerance);
     let fits = |to: usize| {
         let piece = Piece::settled(s, [from, to]);
-        piece.holds(s, from + 1..to, s.times[from], &near).then_some(piece)
+        let holds = piece.holds(s, from + 1..to, s.times[from], &near);
+        (holds && !piece.swings(s, [from, to], tolerance)).then_some(piece)
     };
     let mut good = (from + 1, Piece::settled(s, [from, from + 1]));
     let (mut step, mut bad) = (1, last + 1);
@@ -137,15 +156,21 @@ fn reach(s: &Samples, from: usize, last: usize, tolerance: f64) -> (usize, Piece
 }
 
 /// Few keys whose Catmull-Rom curve stays within `tolerance` of every sample: keys are put where the error is largest, and then those left out that
-/// are not needed.
-pub(super) fn by_rule(s: &Samples, tolerance: f64) -> Curve {
+/// are not needed. None where a slope beside a much shorter gap would swing out between two samples.
+pub(super) fn by_rule(s: &Samples, tolerance: f64) -> Option<Curve> {
     let mut keys = vec![];
     for [first, last] in runs(s) {
-        keys.extend(ruled(s, first, last, tolerance));
+        let run = ruled(s, first, last, tolerance);
+        let swings = |k: usize| piece_by_rule(s, &run, k).swings(s, [run[k], run[k + 1]], tolerance);
+        if (0..run.len() - 1).any(swings) {
+            return None;
+        }
+        keys.extend(run);
     }
     let times = keys.iter().map(|&k| s.times[k]).collect();
     let values = keys.iter().flat_map(|&k| s.value(k).iter().copied()).collect();
-    Curve::new(times, values, s.width, Interpolation::CatmullRom(RULE)).expect("samples of a curve, in order")
+    let curve = Curve::new(times, values, s.width, Interpolation::CatmullRom(RULE));
+    Some(curve.expect("samples of a curve, in order"))
 }
 
 fn ruled(s: &Samples, first: usize, last: usize, tolerance: f64) -> Vec<usize> {

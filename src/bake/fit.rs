@@ -399,7 +399,7 @@ impl<'v> Straight<'v> {
     }
 
     /// How far it is from a value at `u`: radians, or the unit of the values.
-    fn off(&self, u: f64, value: &[f32]) -> f64 {
+    pub fn off(&self, u: f64, value: &[f32]) -> f64 {
         let (a, b) = (self.a, self.b);
         match self.kind {
             Kind::Rotation => {

@@ -71,6 +71,16 @@ pub enum Goal {
     Keys,
 }
 
+impl Goal {
+    /// How much of it a bake leaves.
+    fn left(self, report: &Report) -> usize {
+        match self {
+            Self::Bytes => report.bytes[1],
+            Self::Keys => report.keys[1],
+        }
+    }
+}
+
 impl Default for BakeDesc {
     /// A millimetre, on the skin.
     fn default() -> Self {
@@ -257,7 +267,7 @@ fn bake_from(
         let report = &mut baked.report;
         (report.worst, report.ceiling, report.moments) = (worst, ceiling, moments);
         if ceiling <= 1.0 {
-            return Ok(fewer(&mut plan, &gauge, clip, baked));
+            return Ok(fewer(desc.goal, &mut plan, &gauge, clip, baked));
         }
         // What hid between the moments of the search is searched with.
         if round < SEARCHES && worst.share() > LITTLE {
@@ -289,13 +299,9 @@ fn bake_from(
 }
 
 /// What was found, or all keys where they are if that is less.
-fn fewer(plan: &mut Plan, gauge: &Gauge, clip: &Clip, found: Baked) -> Baked {
+fn fewer(goal: Goal, plan: &mut Plan, gauge: &Gauge, clip: &Clip, found: Baked) -> Baked {
     let mut kept = plan.kept(gauge);
-    let much = |report: &Report| match plan.goal() {
-        Goal::Bytes => report.bytes[1],
-        Goal::Keys => report.keys[1],
-    };
-    if much(&kept.report) >= much(&found.report) {
+    if goal.left(&kept.report) >= goal.left(&found.report) {
         return found;
     }
     let Verdict { worst, ceiling, moments, .. } = times::verify(gauge, clip, &kept.clip);

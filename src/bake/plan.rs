@@ -5,7 +5,7 @@ mod job;
 use super::cost::Costs;
 use super::fit::{Kind, Samples};
 use super::gauge::{Gauge, Looks};
-use super::{BakeDesc, Baked, Goal, Report, SEAM, edit, times};
+use super::{BakeDesc, Baked, Report, SEAM, edit, times};
 use crate::character::Character;
 use crate::clip::{Clip, Curve, Interpolation, Target, Track};
 use job::{Effort, Form, Job, Made};
@@ -137,10 +137,7 @@ impl<'a> Plan<'a> {
 
     /// Raise the share where a few tracks are what keeps it low: those get less.
     fn relieve(&mut self, gauge: &Gauge, looks: &Looks, aim: f64) {
-        let much = |plan: &Self| match (plan.desc.goal, plan.finish().report) {
-            (Goal::Keys, report) => report.keys[1],
-            (Goal::Bytes, report) => report.bytes[1],
-        };
+        let much = |plan: &Self| plan.desc.goal.left(&plan.finish().report);
         for _ in 0..RAISES {
             let (before, was) = (self.state(), much(self));
             self.share *= RAISE;
@@ -234,11 +231,6 @@ impl<'a> Plan<'a> {
         self.share *= part;
         self.make_all(gauge, Effort::Again);
         self.finish()
-    }
-
-    /// What there is to be little of.
-    pub fn goal(&self) -> Goal {
-        self.desc.goal
     }
 
     /// All keys where they are, with no more bits than they need.

@@ -128,7 +128,7 @@ impl Job {
         // No cubic is smaller than three straight pieces, and for a draft both cost the same error.
         if pieces.keys.len() > 4 && effort != Effort::Draft {
             if goal == Goal::Keys && tried(Form::Rule) {
-                others.push(made(cubic::by_rule(s, allowed), false, Form::Rule));
+                others.extend(cubic::by_rule(s, allowed).map(|curve| made(curve, false, Form::Rule)));
             }
             if tried(Form::Slopes) {
                 others.push(made(cubic::own_slopes(s, allowed), false, Form::Slopes));
