@@ -1,8 +1,8 @@
 //! Vectors and numbers of several kinds, for what is written once: `f32` and `f64`, one or eight at a time.
 
-use super::simd::{self, D8, F8, I8};
+use super::simd::{self, D8, F, F8, I};
 use std::fmt::Debug;
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use std::ops::{Add, BitOr, Div, Mul, Neg, Sub};
 
 /// What has the four operations.
 pub trait Number:
@@ -36,16 +36,29 @@ pub trait Real: Number + PartialOrd + Default + 'static {
     fn max(self, other: Self) -> Self;
 }
 
-/// Eight numbers.
+/// Lanes that are chosen.
+pub trait Mask: Copy + BitOr<Output = Self> {
+    /// Whether there is one.
+    fn any(self) -> bool;
+}
+
+impl<const N: usize> Mask for I<N> {
+    #[inline(always)]
+    fn any(self) -> bool {
+        self.any()
+    }
+}
+
+/// Several numbers.
 pub trait Lanes: Number {
     /// What they are.
-    type Real: Real<Wide = Self>;
+    type Real: Real;
+    /// Some of them.
+    type Mask: Mask;
     /// The same in every lane.
     fn splat(x: Self::Real) -> Self;
-    /// From `f32`, exactly.
-    fn of(x: F8) -> Self;
     /// As a list.
-    fn lanes(&mut self) -> &mut [Self::Real; 8];
+    fn lanes(&mut self) -> &mut [Self::Real];
     /// The smaller; `other` where either is NaN.
     fn min(self, other: Self) -> Self;
     /// The larger; `other` where either is NaN.
@@ -53,9 +66,9 @@ pub trait Lanes: Number {
     /// Square root.
     fn sqrt(self) -> Self;
     /// Mask of `self > other`.
-    fn gt(self, other: Self) -> I8;
+    fn gt(self, other: Self) -> Self::Mask;
     /// `a` where the mask is set, else `b`.
-    fn select(mask: I8, a: Self, b: Self) -> Self;
+    fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
     /// `xʸ` for `x ≥ 0`.
     fn pow(self, y: Self) -> Self;
     /// The same `f64` in every lane.
@@ -92,10 +105,6 @@ macro_rules! real {
                 $t::max(self, other)
             }
         }
-        impl Number for $wide {
-            const ZERO: Self = $wide([0.0; 8]);
-            const ONE: Self = $wide([1.0; 8]);
-        }
     };
 }
 
@@ -103,41 +112,42 @@ real!(f32, F8);
 real!(f64, D8);
 
 macro_rules! wide {
-    ($wide:ident, $t:ident, $of:expr, $pow:expr) => {
-        impl Lanes for $wide {
+    ([$($p:tt)*] $wide:ty, $n:expr, $t:ident, $pow:expr) => {
+        impl$($p)* Number for $wide {
+            const ZERO: Self = Self([0.0; $n]);
+            const ONE: Self = Self([1.0; $n]);
+        }
+        impl$($p)* Lanes for $wide {
             type Real = $t;
+            type Mask = I<$n>;
             #[inline(always)]
             fn splat(x: $t) -> Self {
-                Self([x; 8])
+                Self([x; $n])
             }
             #[inline(always)]
-            fn of(x: F8) -> Self {
-                $of(x)
-            }
-            #[inline(always)]
-            fn lanes(&mut self) -> &mut [$t; 8] {
+            fn lanes(&mut self) -> &mut [$t] {
                 &mut self.0
             }
             #[inline(always)]
             fn min(self, other: Self) -> Self {
-                $wide::min(self, other)
+                self.min(other)
             }
             #[inline(always)]
             fn max(self, other: Self) -> Self {
-                $wide::max(self, other)
+                self.max(other)
             }
             #[inline(always)]
             fn sqrt(self) -> Self {
-                $wide::sqrt(self)
+                self.sqrt()
             }
             #[inline(always)]
-            fn gt(self, other: Self) -> I8 {
-                $wide::gt(self, other)
+            fn gt(self, other: Self) -> I<$n> {
+                self.gt(other)
             }
             #[inline(always)]
-            fn select(mask: I8, a: Self, b: Self) -> Self {
+            fn select(mask: I<$n>, a: Self, b: Self) -> Self {
                 let mut out = b;
-                for k in 0..8 {
+                for k in 0..$n {
                     out.0[k] = if mask.0[k] < 0 { a.0[k] } else { b.0[k] };
                 }
                 out
@@ -150,8 +160,8 @@ macro_rules! wide {
     };
 }
 
-wide!(F8, f32, |x| x, simd::pow);
-wide!(D8, f64, |x: F8| D8(x.0.map(f64::from)), D8::powf);
+wide!([<const N: usize>] F<N>, N, f32, simd::pow);
+wide!([] D8, 8, f64, D8::powf);
 
 /// A point, direction or colour.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -227,7 +237,7 @@ impl<L: Lanes> V3<L> {
 
     /// `a` where the mask is set, else `b`.
     #[inline(always)]
-    pub fn select(mask: I8, a: Self, b: Self) -> Self {
+    pub fn select(mask: L::Mask, a: Self, b: Self) -> Self {
         Self { x: L::select(mask, a.x, b.x), y: L::select(mask, a.y, b.y), z: L::select(mask, a.z, b.z) }
     }
 
@@ -244,17 +254,17 @@ impl<L: Lanes> V3<L> {
     }
 }
 
-impl V3<F8> {
+impl<const N: usize> V3<F<N>> {
     /// The same vector in every lane.
     #[inline(always)]
     pub fn splat(v: glam::Vec3) -> Self {
-        Self { x: F8::splat(v.x), y: F8::splat(v.y), z: F8::splat(v.z) }
+        Self { x: F::splat(v.x), y: F::splat(v.y), z: F::splat(v.z) }
     }
 
-    /// Eight vectors.
+    /// A vector a lane.
     #[inline(always)]
-    pub fn gather(v: [glam::Vec3; 8]) -> Self {
-        Self { x: F8(v.map(|v| v.x)), y: F8(v.map(|v| v.y)), z: F8(v.map(|v| v.z)) }
+    pub fn gather(v: [glam::Vec3; N]) -> Self {
+        Self { x: F(v.map(|v| v.x)), y: F(v.map(|v| v.y)), z: F(v.map(|v| v.z)) }
     }
 }
 

@@ -1,20 +1,27 @@
-//! Eight numbers at a time, written once: plain arrays that the compiler turns into vector instructions.
+//! Many numbers at a time, written once: plain arrays that the compiler turns into vector instructions.
 //!
 //! Every operation is exactly rounded IEEE arithmetic lane by lane (no fused multiply-add, no estimates), so a kernel gives
-//! the same bits on every machine. [`run`] compiles a kernel a second time with AVX2 and picks that build where it can.
+//! the same bits on every machine. [`run`] compiles a kernel of eight lanes a second time with AVX2 and picks that build where it
+//! can; [`run_wide`] compiles one of any number of lanes a third time, sixteen wide, with AVX-512.
 
 use glam::Vec4;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
-/// Eight `f32`.
+/// `N` times `f32`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(32))]
-pub struct F8(pub [f32; 8]);
+pub struct F<const N: usize>(pub [f32; N]);
 
-/// Eight `i32`; as a mask, 0 or −1 a lane.
+/// `N` times `i32`; as a mask, 0 or −1 a lane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C, align(32))]
-pub struct I8(pub [i32; 8]);
+pub struct I<const N: usize>(pub [i32; N]);
+
+/// Eight `f32`.
+pub type F8 = F<8>;
+
+/// Eight `i32`.
+pub type I8 = I<8>;
 
 /// Eight `f64`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,10 +32,10 @@ pub struct D8(pub [f64; 8]);
 pub type V8 = super::lanes::V3<F8>;
 
 macro_rules! lanes {
-    ($i:ident => $e:expr) => {{
-        let mut r = [Default::default(); 8];
+    ($i:ident in $n:expr => $e:expr) => {{
+        let mut r = [Default::default(); $n];
         let mut $i = 0;
-        while $i < 8 {
+        while $i < $n {
             r[$i] = $e;
             $i += 1;
         }
@@ -37,12 +44,12 @@ macro_rules! lanes {
 }
 
 macro_rules! lanewise {
-    ($t:ident, $trait:ident, $f:ident, $a:ident, $b:ident, $e:expr) => {
-        impl $trait for $t {
+    ([$($p:tt)*] $t:ty, $n:expr, $trait:ident, $f:ident, $a:ident, $b:ident, $e:expr) => {
+        impl$($p)* $trait for $t {
             type Output = Self;
             #[inline(always)]
             fn $f(self, other: Self) -> Self {
-                Self(lanes!(i => {
+                Self(lanes!(i in $n => {
                     let ($a, $b) = (self.0[i], other.0[i]);
                     $e
                 }))
@@ -51,25 +58,25 @@ macro_rules! lanewise {
     };
 }
 
-lanewise!(F8, Add, add, a, b, a + b);
-lanewise!(F8, Sub, sub, a, b, a - b);
-lanewise!(F8, Mul, mul, a, b, a * b);
-lanewise!(F8, Div, div, a, b, a / b);
-lanewise!(D8, Add, add, a, b, a + b);
-lanewise!(D8, Sub, sub, a, b, a - b);
-lanewise!(D8, Mul, mul, a, b, a * b);
-lanewise!(D8, Div, div, a, b, a / b);
-lanewise!(I8, Add, add, a, b, a.wrapping_add(b));
-lanewise!(I8, Sub, sub, a, b, a.wrapping_sub(b));
-lanewise!(I8, Mul, mul, a, b, a.wrapping_mul(b));
-lanewise!(I8, BitAnd, bitand, a, b, a & b);
-lanewise!(I8, BitOr, bitor, a, b, a | b);
+lanewise!([<const N: usize>] F<N>, N, Add, add, a, b, a + b);
+lanewise!([<const N: usize>] F<N>, N, Sub, sub, a, b, a - b);
+lanewise!([<const N: usize>] F<N>, N, Mul, mul, a, b, a * b);
+lanewise!([<const N: usize>] F<N>, N, Div, div, a, b, a / b);
+lanewise!([] D8, 8, Add, add, a, b, a + b);
+lanewise!([] D8, 8, Sub, sub, a, b, a - b);
+lanewise!([] D8, 8, Mul, mul, a, b, a * b);
+lanewise!([] D8, 8, Div, div, a, b, a / b);
+lanewise!([<const N: usize>] I<N>, N, Add, add, a, b, a.wrapping_add(b));
+lanewise!([<const N: usize>] I<N>, N, Sub, sub, a, b, a.wrapping_sub(b));
+lanewise!([<const N: usize>] I<N>, N, Mul, mul, a, b, a.wrapping_mul(b));
+lanewise!([<const N: usize>] I<N>, N, BitAnd, bitand, a, b, a & b);
+lanewise!([<const N: usize>] I<N>, N, BitOr, bitor, a, b, a | b);
 
-impl Neg for F8 {
+impl<const N: usize> Neg for F<N> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self(lanes!(i => -self.0[i]))
+        Self(lanes!(i in N => -self.0[i]))
     }
 }
 
@@ -81,15 +88,15 @@ impl Neg for D8 {
     }
 }
 
-impl Not for I8 {
+impl<const N: usize> Not for I<N> {
     type Output = Self;
     #[inline(always)]
     fn not(self) -> Self {
-        Self(lanes!(i => !self.0[i]))
+        Self(lanes!(i in N => !self.0[i]))
     }
 }
 
-impl Mul<f32> for F8 {
+impl<const N: usize> Mul<f32> for F<N> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, k: f32) -> Self {
@@ -97,7 +104,7 @@ impl Mul<f32> for F8 {
     }
 }
 
-impl Add<f32> for F8 {
+impl<const N: usize> Add<f32> for F<N> {
     type Output = Self;
     #[inline(always)]
     fn add(self, k: f32) -> Self {
@@ -105,46 +112,46 @@ impl Add<f32> for F8 {
     }
 }
 
-impl F8 {
+impl<const N: usize> F<N> {
     /// Zero in every lane.
-    pub const ZERO: Self = Self([0.0; 8]);
+    pub const ZERO: Self = Self([0.0; N]);
     /// One in every lane.
-    pub const ONE: Self = Self([1.0; 8]);
+    pub const ONE: Self = Self([1.0; N]);
 
     /// The same number in every lane.
     #[inline(always)]
     pub fn splat(x: f32) -> Self {
-        Self([x; 8])
+        Self([x; N])
     }
 
-    /// The first eight of a slice.
+    /// The first of a slice.
     ///
     /// # Panics
     /// If there are fewer.
     #[inline(always)]
     pub fn load(s: &[f32]) -> Self {
-        Self(s[..8].try_into().expect("eight lanes"))
+        Self(s[..N].try_into().expect("as many as lanes"))
     }
 
-    /// Into the first eight of a slice.
+    /// Into the first of a slice.
     ///
     /// # Panics
     /// If there are fewer.
     #[inline(always)]
     pub fn store(self, s: &mut [f32]) {
-        s[..8].copy_from_slice(&self.0);
+        s[..N].copy_from_slice(&self.0);
     }
 
     /// The smaller; `other` where either is NaN.
     #[inline(always)]
     pub fn min(self, other: Self) -> Self {
-        Self(lanes!(i => if self.0[i] < other.0[i] { self.0[i] } else { other.0[i] }))
+        Self(lanes!(i in N => if self.0[i] < other.0[i] { self.0[i] } else { other.0[i] }))
     }
 
     /// The larger; `other` where either is NaN.
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
-        Self(lanes!(i => if self.0[i] > other.0[i] { self.0[i] } else { other.0[i] }))
+        Self(lanes!(i in N => if self.0[i] > other.0[i] { self.0[i] } else { other.0[i] }))
     }
 
     /// Into 0…1; NaN becomes 0.
@@ -156,121 +163,142 @@ impl F8 {
     /// Square root.
     #[inline(always)]
     pub fn sqrt(self) -> Self {
-        Self(lanes!(i => self.0[i].sqrt()))
+        Self(lanes!(i in N => self.0[i].sqrt()))
     }
 
     /// Mask of `self > other`.
     #[inline(always)]
-    pub fn gt(self, other: Self) -> I8 {
-        I8(lanes!(i => -((self.0[i] > other.0[i]) as i32)))
+    pub fn gt(self, other: Self) -> I<N> {
+        I(lanes!(i in N => -((self.0[i] > other.0[i]) as i32)))
     }
 
     /// Mask of `self ≥ other`.
     #[inline(always)]
-    pub fn ge(self, other: Self) -> I8 {
-        I8(lanes!(i => -((self.0[i] >= other.0[i]) as i32)))
+    pub fn ge(self, other: Self) -> I<N> {
+        I(lanes!(i in N => -((self.0[i] >= other.0[i]) as i32)))
     }
 
     /// Mask of `self = other`.
     #[inline(always)]
-    pub fn equal(self, other: Self) -> I8 {
-        I8(lanes!(i => -((self.0[i] == other.0[i]) as i32)))
+    pub fn equal(self, other: Self) -> I<N> {
+        I(lanes!(i in N => -((self.0[i] == other.0[i]) as i32)))
     }
 
     /// The bits of each lane.
     #[inline(always)]
-    pub fn to_bits(self) -> I8 {
-        I8(lanes!(i => self.0[i].to_bits() as i32))
+    pub fn to_bits(self) -> I<N> {
+        I(lanes!(i in N => self.0[i].to_bits() as i32))
     }
 
     /// To the nearest integer (ties to even); exact for `|x| ≤ 2²²`, some integer otherwise.
     #[inline(always)]
-    pub fn round(self) -> I8 {
+    pub fn round(self) -> I<N> {
         // Adding 1.5·2²³ pushes the fraction out of the mantissa.
         const MAGIC: f32 = 12_582_912.0;
-        I8(lanes!(i => ((self.0[i] + MAGIC).to_bits() as i32).wrapping_sub(MAGIC.to_bits() as i32)))
+        I(lanes!(i in N => ((self.0[i] + MAGIC).to_bits() as i32).wrapping_sub(MAGIC.to_bits() as i32)))
     }
 
     /// The largest integer that is not above; exact for `|x| ≤ 2²²`.
     #[inline(always)]
-    pub fn floor(self) -> I8 {
+    pub fn floor(self) -> I<N> {
         let r = self.round();
         r + r.to_f32().gt(self)
     }
 }
 
-impl I8 {
+impl<const N: usize> I<N> {
     /// Zero in every lane.
-    pub const ZERO: Self = Self([0; 8]);
-    /// 0, 1, 2 … 7.
-    pub const IOTA: Self = Self([0, 1, 2, 3, 4, 5, 6, 7]);
+    pub const ZERO: Self = Self([0; N]);
+    /// 0, 1, 2 …
+    pub const IOTA: Self = {
+        let mut of = [0; N];
+        let mut i = 0;
+        while i < N {
+            of[i] = i as i32;
+            i += 1;
+        }
+        Self(of)
+    };
 
     /// The same number in every lane.
     #[inline(always)]
     pub fn splat(x: i32) -> Self {
-        Self([x; 8])
+        Self([x; N])
     }
 
     /// To floating point, rounded to nearest.
     #[inline(always)]
-    pub fn to_f32(self) -> F8 {
-        F8(lanes!(i => self.0[i] as f32))
+    pub fn to_f32(self) -> F<N> {
+        F(lanes!(i in N => self.0[i] as f32))
     }
 
     /// The bits as floating point.
     #[inline(always)]
-    pub fn from_bits(self) -> F8 {
-        F8(lanes!(i => f32::from_bits(self.0[i] as u32)))
+    pub fn from_bits(self) -> F<N> {
+        F(lanes!(i in N => f32::from_bits(self.0[i] as u32)))
     }
 
     /// The smaller.
     #[inline(always)]
     pub fn min(self, other: Self) -> Self {
-        Self(lanes!(i => if self.0[i] < other.0[i] { self.0[i] } else { other.0[i] }))
+        Self(lanes!(i in N => if self.0[i] < other.0[i] { self.0[i] } else { other.0[i] }))
     }
 
     /// The larger.
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
-        Self(lanes!(i => if self.0[i] > other.0[i] { self.0[i] } else { other.0[i] }))
+        Self(lanes!(i in N => if self.0[i] > other.0[i] { self.0[i] } else { other.0[i] }))
     }
 
     /// Mask of `self > other`.
     #[inline(always)]
-    pub fn gt(self, other: Self) -> I8 {
-        I8(lanes!(i => -((self.0[i] > other.0[i]) as i32)))
+    pub fn gt(self, other: Self) -> I<N> {
+        I(lanes!(i in N => -((self.0[i] > other.0[i]) as i32)))
     }
 
     /// Mask of `self = other`.
     #[inline(always)]
-    pub fn equal(self, other: Self) -> I8 {
-        I8(lanes!(i => -((self.0[i] == other.0[i]) as i32)))
+    pub fn equal(self, other: Self) -> I<N> {
+        I(lanes!(i in N => -((self.0[i] == other.0[i]) as i32)))
     }
 
     /// Arithmetic shift to the right.
     #[inline(always)]
     pub fn shift_right(self, n: u32) -> Self {
-        Self(lanes!(i => self.0[i] >> n))
+        Self(lanes!(i in N => self.0[i] >> n))
     }
 
     /// Shift to the left.
     #[inline(always)]
     pub fn shift_left(self, n: u32) -> Self {
-        Self(lanes!(i => self.0[i] << n))
+        Self(lanes!(i in N => self.0[i] << n))
     }
 
     /// `a` where the mask is set, else `b`.
     #[inline(always)]
-    pub fn select(self, a: F8, b: F8) -> F8 {
-        F8(lanes!(i => if self.0[i] < 0 { a.0[i] } else { b.0[i] }))
+    pub fn select(self, a: F<N>, b: F<N>) -> F<N> {
+        F(lanes!(i in N => if self.0[i] < 0 { a.0[i] } else { b.0[i] }))
     }
 
     /// `a` where the mask is set, else `b`.
     #[inline(always)]
-    pub fn select_int(self, a: I8, b: I8) -> I8 {
-        I8(lanes!(i => if self.0[i] < 0 { a.0[i] } else { b.0[i] }))
+    pub fn select_int(self, a: I<N>, b: I<N>) -> I<N> {
+        I(lanes!(i in N => if self.0[i] < 0 { a.0[i] } else { b.0[i] }))
     }
 
+    /// Any sign set.
+    #[inline(always)]
+    pub fn any(self) -> bool {
+        let (mut signs, mut i) = (0, 0);
+        while i < N {
+            signs |= self.0[i];
+            i += 1;
+        }
+        signs < 0
+    }
+}
+
+impl I8 {
     /// One bit a lane: the sign.
     #[inline(always)]
     pub fn bitmask(self) -> u32 {
@@ -286,25 +314,19 @@ impl I8 {
     pub fn all(self) -> bool {
         self.bitmask() == 0xff
     }
-
-    /// Any sign set.
-    #[inline(always)]
-    pub fn any(self) -> bool {
-        self.bitmask() != 0
-    }
 }
 
 impl D8 {
     /// The smaller; `other` where either is NaN.
     #[inline(always)]
     pub fn min(self, other: Self) -> Self {
-        Self(lanes!(i => if self.0[i] < other.0[i] { self.0[i] } else { other.0[i] }))
+        Self(lanes!(i in 8 => if self.0[i] < other.0[i] { self.0[i] } else { other.0[i] }))
     }
 
     /// The larger; `other` where either is NaN.
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
-        Self(lanes!(i => if self.0[i] > other.0[i] { self.0[i] } else { other.0[i] }))
+        Self(lanes!(i in 8 => if self.0[i] > other.0[i] { self.0[i] } else { other.0[i] }))
     }
 
     /// Square root.
@@ -316,12 +338,12 @@ impl D8 {
     /// Mask of `self > other`.
     #[inline(always)]
     pub fn gt(self, other: Self) -> I8 {
-        I8(lanes!(i => -((self.0[i] > other.0[i]) as i32)))
+        I(lanes!(i in 8 => -((self.0[i] > other.0[i]) as i32)))
     }
 
     /// `xʸ`, as exact as the system's.
     pub fn powf(self, y: Self) -> Self {
-        Self(lanes!(i => self.0[i].powf(y.0[i])))
+        Self(lanes!(i in 8 => self.0[i].powf(y.0[i])))
     }
 }
 
@@ -329,11 +351,11 @@ impl D8 {
 ///
 /// `x = 2ᵉ·m` with `m` in √½…√2; `ln m = 2 artanh((m−1)/(m+1))` by its series to the ninth power.
 #[inline(always)]
-pub fn log2(x: F8) -> F8 {
+pub fn log2<const N: usize>(x: F<N>) -> F<N> {
     const SQRT_HALF: i32 = 0x3f35_04f3;
-    let bits = x.to_bits() - I8::splat(SQRT_HALF);
+    let bits = x.to_bits() - I::splat(SQRT_HALF);
     let e = bits.shift_right(23);
-    let m = ((bits & I8::splat(0x007f_ffff)) + I8::splat(SQRT_HALF)).from_bits();
+    let m = ((bits & I::splat(0x007f_ffff)) + I::splat(SQRT_HALF)).from_bits();
     let s = (m + -1.0) / (m + 1.0);
     let s2 = s * s;
     let k = 2.0 * std::f32::consts::LOG2_E;
@@ -347,14 +369,14 @@ pub fn log2(x: F8) -> F8 {
 ///
 /// `x = n + f` with `|f| ≤ ½`; `2ᶠ` by the Taylor series of `e^{f ln 2}` to the sixth power.
 #[inline(always)]
-pub fn exp2(x: F8) -> F8 {
-    let x = x.max(F8::splat(-126.0)).min(F8::splat(127.0));
+pub fn exp2<const N: usize>(x: F<N>) -> F<N> {
+    let x = x.max(F::splat(-126.0)).min(F::splat(127.0));
     let n = x.round();
     let f = (x - n.to_f32()) * std::f32::consts::LN_2;
     let f2 = f * f;
     let tail = (f * (1.0 / 120.0) + 1.0 / 24.0) + f2 * (1.0 / 720.0);
     let p = (f + 1.0) + ((f * (1.0 / 6.0) + 0.5) + f2 * tail) * f2;
-    p * (n + I8::splat(127)).shift_left(23).from_bits()
+    p * (n + I::splat(127)).shift_left(23).from_bits()
 }
 
 /// `xʸ` for `x ≥ 0`; 0 for `x` below 1e-37.
@@ -362,20 +384,20 @@ pub fn exp2(x: F8) -> F8 {
 /// For `x` in 1e-37…1 and `y` in 1…1024 the relative error is below `3e-7 + 2e-7·|y log₂ x|`, hence below 2.6e-5; powers below
 /// `2⁻¹²⁶` come out as `2⁻¹²⁶`. Where all of `y` is one whole number up to 64, powers are products, and 0 below `2⁻⁶⁰`.
 #[inline(always)]
-pub fn pow(x: F8, y: F8) -> F8 {
+pub fn pow<const N: usize>(x: F<N>, y: F<N>) -> F<N> {
     let n = y.0[0] as i32;
-    if (1..=64).contains(&n) && y.equal(F8::splat(n as f32)).all() {
+    if (1..=64).contains(&n) && !(!y.equal(F::splat(n as f32))).any() {
         return whole_power(x, n as u32);
     }
-    let tiny = F8::splat(1e-37);
-    x.gt(tiny).select(exp2(y * log2(x.max(tiny))), F8::ZERO)
+    let tiny = F::splat(1e-37);
+    x.gt(tiny).select(exp2(y * log2(x.max(tiny))), F::ZERO)
 }
 
 /// `xⁿ` by squares (Knuth 4.6.3); 0 where a product would come near the smallest numbers, with which machines are slow.
 #[inline(always)]
-fn whole_power(x: F8, mut n: u32) -> F8 {
-    let least = F8::splat(f32::from_bits((127 - 120 / n) << 23));
-    let (mut square, mut out) = (x.gt(least).select(x, F8::ZERO), F8::ONE);
+fn whole_power<const N: usize>(x: F<N>, mut n: u32) -> F<N> {
+    let least = F::splat(f32::from_bits((127 - 120 / n) << 23));
+    let (mut square, mut out) = (x.gt(least).select(x, F::ZERO), F::ONE);
     loop {
         if n & 1 != 0 {
             out = out * square;
@@ -397,12 +419,22 @@ pub trait Kernel {
     fn run(self) -> Self::Output;
 }
 
+/// The same for any number of lanes.
+pub trait WideKernel {
+    /// What it gives, whatever the number of lanes.
+    type Output;
+    /// Do it, `N` at a time.
+    fn run<const N: usize>(self) -> Self::Output;
+}
+
 /// Which build of a kernel runs; the results are the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Isa {
-    /// AVX2 where the machine has it. (AVX-512 gives the same bits and takes the same time: the kernels are eight wide.)
+    /// The widest that the machine has: AVX2, and AVX-512 for what can be sixteen wide.
     #[default]
     Best,
+    /// AVX2 where the machine has it, and nothing beyond.
+    Avx2,
     /// What every machine of the target has.
     Portable,
 }
@@ -411,13 +443,37 @@ pub enum Isa {
 #[inline]
 pub fn run<K: Kernel>(isa: Isa, kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
-    if isa == Isa::Best && *HAS_AVX2 {
+    if isa != Isa::Portable && *HAS_AVX2 {
         // What calling it needs has just been checked.
         #[allow(unsafe_code)]
         return unsafe { run_avx2(kernel) };
     }
     let _ = isa;
     kernel.run()
+}
+
+/// Run a kernel with sixteen lanes where the machine has registers for them and `isa` does not forbid it, else with eight as [`run`] does.
+#[inline]
+pub fn run_wide<K: WideKernel>(isa: Isa, kernel: K) -> K::Output {
+    #[cfg(target_arch = "x86_64")]
+    if isa == Isa::Best && *HAS_AVX512 {
+        // What calling it needs has just been checked.
+        #[allow(unsafe_code)]
+        return unsafe { run_avx512(kernel) };
+    }
+    run(isa, Eight(kernel))
+}
+
+/// A kernel of any number of lanes, with eight.
+struct Eight<K>(K);
+
+impl<K: WideKernel> Kernel for Eight<K> {
+    type Output = K::Output;
+
+    #[inline(always)]
+    fn run(self) -> K::Output {
+        self.0.run::<8>()
+    }
 }
 
 /// Whether there is what [`run_avx2`] uses: AVX2, and what counts bits, which came to processors before it.
@@ -430,10 +486,26 @@ static HAS_AVX2: std::sync::LazyLock<bool> = std::sync::LazyLock::new(|| {
         && is_x86_feature_detected!("popcnt")
 });
 
+/// Whether there is what [`run_avx512`] uses: what every processor with AVX-512 has had from the second generation on.
+#[cfg(target_arch = "x86_64")]
+static HAS_AVX512: std::sync::LazyLock<bool> = std::sync::LazyLock::new(|| {
+    *HAS_AVX2
+        && is_x86_feature_detected!("avx512f")
+        && is_x86_feature_detected!("avx512bw")
+        && is_x86_feature_detected!("avx512dq")
+        && is_x86_feature_detected!("avx512vl")
+});
+
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
 fn run_avx2<K: Kernel>(kernel: K) -> K::Output {
     kernel.run()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,bmi1,bmi2,lzcnt,popcnt")]
+fn run_avx512<K: WideKernel>(kernel: K) -> K::Output {
+    kernel.run::<16>()
 }
 
 #[cfg(test)]
@@ -446,7 +518,7 @@ mod tests {
         #[inline(always)]
         fn run(self) {
             for p in self.0.chunks_exact(8) {
-                let (x, y) = (F8(lanes!(i => p[i][0])), F8(lanes!(i => p[i][1])));
+                let (x, y) = (F(lanes!(i in 8 => p[i][0])), F(lanes!(i in 8 => p[i][1])));
                 self.1.extend(pow(x, y).0);
             }
         }
@@ -492,9 +564,9 @@ mod tests {
 
     #[test]
     fn rounding() {
-        let x = F8([-1.5, -0.5, -0.25, 0.0, 0.5, 0.75, 1.5, 4_000_000.0]);
+        let x = F([-1.5, -0.5, -0.25, 0.0, 0.5, 0.75, 1.5, 4_000_000.0]);
         assert_eq!(x.round().0, [-2, 0, 0, 0, 0, 1, 2, 4_000_000]);
         assert_eq!(x.floor().0, [-2, -1, -1, 0, 0, 0, 1, 4_000_000]);
-        assert_eq!(I8([-1, 0, -1, 0, 0, 0, 0, -1]).bitmask(), 0b1000_0101);
+        assert_eq!(I([-1, 0, -1, 0, 0, 0, 0, -1]).bitmask(), 0b1000_0101);
     }
 }

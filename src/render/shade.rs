@@ -1,6 +1,6 @@
 //! Blinn-Phong, once, for every renderer: eight points at a time, in `f32` or `f64`.
 
-use crate::math::lanes::{Lanes, Number, Real, V3};
+use crate::math::lanes::{Lanes, Mask, Number, Real, V3};
 use crate::math::simd::{F8, I8, V8};
 use crate::scene::{Light, LightKind};
 use glam::Vec3;

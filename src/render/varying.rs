@@ -2,7 +2,8 @@
 
 use super::material::Points;
 use super::sample::Uv;
-use crate::math::simd::{F8, I8, V8};
+use crate::math::lanes::V3;
+use crate::math::simd::{F, F8, I8, V8};
 use crate::scene::{Camera, Object, Projection, TextureRef};
 use glam::{Vec2, Vec3, Vec4};
 
@@ -172,10 +173,10 @@ pub(crate) fn corners<const ONE: bool>(object: &Object, ids: &[u32; 8]) -> [[u32
 
 /// Unit, from points towards the eye.
 #[inline(always)]
-pub(crate) fn view(camera: &Camera, position: V8) -> V8 {
+pub(crate) fn view<const N: usize>(camera: &Camera, position: V3<F<N>>) -> V3<F<N>> {
     match camera.projection {
-        Projection::Perspective { .. } => (V8::splat(camera.eye()) - position).unit(),
-        Projection::Orthographic { .. } => V8::splat(camera.scene_from_view.matrix3.z_axis.into()),
+        Projection::Perspective { .. } => (V3::splat(camera.eye()) - position).unit(),
+        Projection::Orthographic { .. } => V3::splat(camera.scene_from_view.matrix3.z_axis.into()),
     }
 }
 

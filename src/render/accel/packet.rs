@@ -11,7 +11,7 @@ use super::search::{Any, Packs};
 use super::tree::{self, LEAF, Node, Visitor};
 use super::triangle::Shear;
 use super::world::{Object, Own, Query, World};
-use crate::math::simd::F8;
+use crate::math::simd::{F, F8};
 use glam::Vec3A;
 use std::marker::PhantomData;
 
@@ -109,7 +109,7 @@ impl Packet {
 impl Rays {
     /// No rays: nothing is entered.
     const EMPTY: Self = {
-        let (none, zero) = ([F8([f32::NEG_INFINITY; 8]); 2], [[F8::ZERO; 2]; 3]);
+        let (none, zero) = ([F([f32::NEG_INFINITY; 8]); 2], [[F8::ZERO; 2]; 3]);
         Self { slope: zero, near: zero, far: zero, t_min: [F8::ZERO; 2], t_max: none }
     };
 

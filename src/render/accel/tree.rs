@@ -3,7 +3,7 @@
 use super::build::Span;
 use super::lanes::{Lanes, Stack};
 use super::ray::Slab;
-use crate::math::simd::F8;
+use crate::math::simd::{F, F8};
 use glam::Vec3A;
 
 /// A child that is a leaf; the other bits say which.
@@ -23,7 +23,7 @@ pub struct Node {
 
 impl Node {
     pub const EMPTY: Self = {
-        let (lo, hi) = (F8([f32::INFINITY; 8]), F8([f32::NEG_INFINITY; 8]));
+        let (lo, hi) = (F([f32::INFINITY; 8]), F([f32::NEG_INFINITY; 8]));
         Self { planes: [lo, lo, lo, hi, hi, hi], children: [LEAF; 8], order: [0x7654_3210; 8] }
     };
 

@@ -213,7 +213,7 @@ mod tests {
                 assert_eq!((word.0[k] as u32).to_le_bytes(), want, "{}", c.0[k]);
             }
         }
-        let c = F8([f32::NAN, f32::INFINITY, -1.0, 0.0, 1e-30, 0.5, 2.0, 1.0]);
+        let c = F([f32::NAN, f32::INFINITY, -1.0, 0.0, 1e-30, 0.5, 2.0, 1.0]);
         let word = encode8([c, c, c, c]);
         for k in 0..8 {
             assert_eq!((word.0[k] as u32).to_le_bytes(), color::encode_srgb8([c.0[k]; 4]), "{}", c.0[k]);

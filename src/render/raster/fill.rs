@@ -6,7 +6,7 @@
 use super::TILE;
 use super::frame::{Frame, ROTATED};
 use super::setup::{Bounds, Fragment, Setup};
-use crate::math::simd::{F8, I8};
+use crate::math::simd::{F, F8, I, I8};
 
 /// Nothing is seen here.
 pub(super) const NONE: u32 = u32::MAX;
@@ -21,11 +21,74 @@ pub(super) struct Visibility {
     /// A bit for each 8×8 block that was cleared: row of blocks · 8 + column.
     pub touched: u64,
     samples: usize,
+    pub places: Places,
+}
+
+/// Where triangles won, at one sample a pixel: what is seen of them is seen there.
+#[derive(Debug, Default)]
+pub(super) struct Places {
+    /// The first of eight samples side by side.
+    at: Vec<u16>,
+    /// Triangles in the order in which they were drawn, and where their places end.
+    of: Vec<(u32, u32)>,
+}
+
+/// Places that one triangle can have in a tile.
+const MOST: usize = TILE * TILE / 8;
+
+/// From so many on, places where nothing is seen any more are dropped: 4096 are left at most.
+const MANY: usize = 1 << 15;
+
+impl Places {
+    /// Triangles, and where they may be seen.
+    pub fn iter(&self) -> impl Iterator<Item = (u32, &[u16])> {
+        let mut start = 0;
+        self.of.iter().map(move |&(id, end)| {
+            let places = &self.at[start..end as usize];
+            start = end as usize;
+            (id, places)
+        })
+    }
+
+    fn end(&self) -> usize {
+        self.of.last().map_or(0, |l| l.1 as usize)
+    }
+
+    /// Room for a triangle's places, and where it starts.
+    #[inline(always)]
+    fn room(&mut self, seen: &[u32]) -> (usize, &mut [u16; MOST]) {
+        let mut start = self.end();
+        if start + MOST > self.at.len() {
+            start = self.make_room(seen);
+        }
+        (start, (&mut self.at[start..start + MOST]).try_into().expect("as much"))
+    }
+
+    #[inline(never)]
+    fn make_room(&mut self, seen: &[u32]) -> usize {
+        if self.at.len() >= MANY {
+            let (mut from, mut to) = (0, 0);
+            for (id, end) in &mut self.of {
+                for k in from..*end as usize {
+                    let at = self.at[k];
+                    if seen[at as usize..][..8].contains(id) {
+                        self.at[to] = at;
+                        to += 1;
+                    }
+                }
+                (from, *end) = (*end as usize, to as u32);
+            }
+        }
+        let end = self.end();
+        self.at.resize(self.at.len().max(end + MANY), 0);
+        end
+    }
 }
 
 impl Visibility {
     pub fn start(&mut self, samples: usize) {
         (self.samples, self.touched) = (samples, 0);
+        self.places.of.clear();
         self.z.resize(4 * TILE * TILE, 0.0);
         self.id.resize(4 * TILE * TILE, NONE);
     }
@@ -216,7 +279,7 @@ impl Walk {
             z = [at(ROTATED[0]), at(ROTATED[1]), at(ROTATED[2]), at(ROTATED[3])];
         }
         let pixel = lane_pixels(frame.samples);
-        self.z = F8([z[0], z[1], z[2], z[3], z[0], z[1], z[2], z[3]]) + pixel.to_f32() * self.z_x;
+        self.z = F([z[0], z[1], z[2], z[3], z[0], z[1], z[2], z[3]]) + pixel.to_f32() * self.z_x;
     }
 
     /// Visit every eight samples of which one is covered.
@@ -238,11 +301,15 @@ impl Walk {
             let (mut f0, mut f1, mut f2) = (e0, e1, e2);
             let (mut at, mut x) = ((y * TILE as i32 + first) as usize * samples, first as f32);
             let z_y = self.z_y * y as f32;
+            let mut met = false;
             for _ in 0..steps {
                 let out = f0 | f1 | f2;
                 if !out.all() {
                     let z = self.z + (self.z_x * x + z_y);
                     visitor.see(at, !out, z.max(lo).min(hi));
+                    met = true;
+                } else if met {
+                    break;
                 }
                 (f0, f1, f2) = (f0 + across0, f1 + across1, f2 + across2);
                 (at, x) = (at + 8, x + wide as f32);
@@ -256,7 +323,19 @@ impl Walk {
     pub fn fill(&self, samples: usize, v: &mut Visibility, keep: impl Keep) {
         v.touch(self.x, self.y);
         let (z, ids) = (&mut v.z[..], &mut v.id[..]);
-        self.visit(samples, &mut Fill { z, ids, id: self.id, keep });
+        if samples > 1 {
+            return self.visit(
+                samples,
+                &mut Fill::<_, false> { z, ids, id: self.id, keep, places: &mut [0; MOST], n: 0 },
+            );
+        }
+        let (start, places) = v.places.room(ids);
+        let mut fill = Fill::<_, true> { z, ids, id: self.id, keep, places, n: 0 };
+        self.visit(1, &mut fill);
+        if fill.n > 0 {
+            let end = (start + fill.n) as u32;
+            v.places.of.push((self.id, end));
+        }
     }
 
     /// Depth at a pixel's centre in the tile.
@@ -288,20 +367,23 @@ impl Keep for All {
     }
 }
 
-struct Fill<'a, K> {
+/// `LIST`: note where the triangle wins.
+struct Fill<'a, K, const LIST: bool> {
     z: &'a mut [f32],
     ids: &'a mut [u32],
     id: u32,
     keep: K,
+    places: &'a mut [u16; MOST],
+    n: usize,
 }
 
-impl<K: Keep> Visitor for Fill<'_, K> {
+impl<K: Keep, const LIST: bool> Visitor for Fill<'_, K, LIST> {
     #[inline(always)]
     fn see(&mut self, at: usize, inside: I8, z: F8) {
         let zs: &mut [f32; 8] = (&mut self.z[at..at + 8]).try_into().expect("eight");
         let ids: &mut [u32; 8] = (&mut self.ids[at..at + 8]).try_into().expect("eight");
         let id = I8::splat(self.id as i32);
-        let (old_z, mut old_id) = (F8(*zs), I8::ZERO);
+        let (old_z, mut old_id) = (F(*zs), I8::ZERO);
         for k in 0..8 {
             old_id.0[k] = ids[k] as i32;
         }
@@ -314,6 +396,10 @@ impl<K: Keep> Visitor for Fill<'_, K> {
         let new = wins.select_int(id, old_id);
         for k in 0..8 {
             ids[k] = new.0[k] as u32;
+        }
+        if LIST {
+            self.places[self.n % MOST] = at as u16;
+            self.n += 1;
         }
     }
 }
@@ -328,7 +414,7 @@ fn before(a: I8, b: I8) -> I8 {
 /// The pixel of each lane, from the first.
 #[inline(always)]
 pub(super) fn lane_pixels(samples: usize) -> I8 {
-    if samples == 1 { I8::IOTA } else { I8([0, 0, 0, 0, 1, 1, 1, 1]) }
+    if samples == 1 { I8::IOTA } else { I([0, 0, 0, 0, 1, 1, 1, 1]) }
 }
 
 /// Where each lane's sample lies, in 1/256 pixels from the first pixel's centre.
@@ -339,8 +425,8 @@ pub(super) fn lane_offsets(samples: usize) -> [I8; 2] {
     }
     const R: [[i32; 2]; 4] = ROTATED;
     [
-        I8([R[0][0], R[1][0], R[2][0], R[3][0], 256 + R[0][0], 256 + R[1][0], 256 + R[2][0], 256 + R[3][0]]),
-        I8([R[0][1], R[1][1], R[2][1], R[3][1], R[0][1], R[1][1], R[2][1], R[3][1]]),
+        I([R[0][0], R[1][0], R[2][0], R[3][0], 256 + R[0][0], 256 + R[1][0], 256 + R[2][0], 256 + R[3][0]]),
+        I([R[0][1], R[1][1], R[2][1], R[3][1], R[0][1], R[1][1], R[2][1], R[3][1]]),
     ]
 }
 

@@ -3,6 +3,7 @@
 use super::Stats;
 use crate::math::simd::{F8, Isa, V8};
 use crate::render::Settings;
+use crate::render::shade::Lamp;
 use crate::scene::{AlphaMode, Material, Object, Projection, Scene};
 use glam::{Vec3, Vec4};
 
@@ -30,6 +31,8 @@ pub(super) struct Draw<'a> {
     pub cull: bool,
     /// What shading reads is continuous where triangles share a vertex.
     pub continuous: bool,
+    /// Its material is the same all over, and only lamps light it.
+    pub clay: bool,
 }
 
 /// Rows of `picture_from_scene`: homogeneous pixels relative to the picture's centre, y down, and depth.
@@ -56,6 +59,8 @@ pub(super) struct Frame<'a> {
     /// How much depth may differ within a smooth surface and a pixel.
     pub depth_step: [f32; 2],
     pub stats: Stats,
+    /// The scene's lights.
+    pub lamps: Vec<Lamp<f32>>,
 }
 
 static FALLBACK: std::sync::LazyLock<Material> = std::sync::LazyLock::new(Material::default);
@@ -89,6 +94,7 @@ impl<'a> Frame<'a> {
             triangle_count: 0,
             depth_step: super::merge::depth_step(h, &scene.camera),
             stats: Stats::default(),
+            lamps: scene.lights.iter().map(Lamp::from).collect(),
         };
         for (index, object) in scene.objects.iter().enumerate() {
             frame.admit(index, object);
@@ -121,6 +127,13 @@ impl<'a> Frame<'a> {
             },
             cull: !material.double_sided,
             continuous: material.unlit || !object.normals.is_empty(),
+            clay: !object.normals.is_empty()
+                && object.mesh.colors.is_empty()
+                && crate::render::material::maps(material).next().is_none()
+                && !material.unlit
+                && !material.double_sided
+                && material.alpha != AlphaMode::Blend
+                && self.scene.style.is_plain(),
         });
         self.triangle_count = end as u32;
         self.vertex_count += v;

@@ -22,6 +22,7 @@
 
 mod blend;
 mod channels;
+mod clay;
 mod clip;
 mod colors;
 mod encode;

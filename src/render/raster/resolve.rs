@@ -2,15 +2,16 @@
 //!
 //! Triangles with enough pixels in the tile are shaded by themselves; what is left over is shaded in order of material.
 
+use super::clay::Clay;
 use super::colors::{Colors, Sink};
 use super::frame::{Draw, Frame, ROTATED};
 use super::merge::share_a_vertex;
-use super::scan::{self, Key, WHOLE, covers, key};
+use super::scan::{self, Key, ROOM, WHOLE, covers, key};
 use super::setup::Bins;
 use super::surface::{self, Corners, Shade};
 use super::tile::TileScratch;
 use super::{Stats, TILE};
-use crate::math::simd::{F8, I8};
+use crate::math::simd::{F, F8, I};
 use glam::Vec4;
 
 /// From so many pixels on, the rest of a triangle is shaded by itself.
@@ -18,7 +19,7 @@ const GROUP: u32 = 5;
 
 /// Batches of eight evaluations a call: the shading equation is a long chain of operations that wait for each other, so the
 /// processor works at two batches at once where it finds them in one loop.
-const BATCHES: usize = 8;
+pub(super) const BATCHES: usize = 8;
 
 /// The part of a tile that is in the picture, and where it is.
 #[derive(Clone, Copy)]
@@ -41,13 +42,35 @@ impl Area {
     }
 }
 
-/// Colours of as many batches.
+/// Colours of as many batches, a plane a channel.
 #[derive(Debug)]
-pub(super) struct Shades([[F8; 4]; BATCHES]);
+#[repr(align(64))]
+pub(super) struct Shades(pub [[f32; 8 * BATCHES]; 4]);
 
 impl Default for Shades {
     fn default() -> Self {
-        Self([[F8::ZERO; 4]; BATCHES])
+        Self([[0.0; 8 * BATCHES]; 4])
+    }
+}
+
+impl Shades {
+    /// Eight of them.
+    #[inline(always)]
+    pub fn batch(&self, i: usize) -> [F8; 4] {
+        let c = &self.0;
+        [
+            F8::load(&c[0][8 * i..]),
+            F8::load(&c[1][8 * i..]),
+            F8::load(&c[2][8 * i..]),
+            F8::load(&c[3][8 * i..]),
+        ]
+    }
+
+    #[inline(always)]
+    pub fn set(&mut self, i: usize, rgba: &[F8; 4]) {
+        for c in 0..4 {
+            rgba[c].store(&mut self.0[c][8 * i..]);
+        }
     }
 }
 
@@ -65,7 +88,7 @@ pub(super) fn resolve(
     // What was found for another scene means nothing here.
     scratch.last_draw = LastDraw::default();
     if frame.samples == 1 {
-        scan::look(frame, bins, tile, area, scratch);
+        scan::look(bins, tile, scratch);
     } else {
         scan::scan(frame, area, scratch);
     }
@@ -90,20 +113,24 @@ fn chain(frame: &Frame, area: Area, k: usize, scratch: &mut TileScratch) {
         while chain.count - done >= GROUP {
             let at = (chain.first + done) as usize;
             let n = (chain.count - done).min(8 * BATCHES as u32);
-            let n = if n % 8 >= GROUP { n } else { n & !7 };
-            let count = n.div_ceil(8) as usize;
+            let n = if n % 8 >= GROUP { n } else { n & !7 } as usize;
             // There is room beyond the chain's end for lanes that repeat the first.
-            let keys = &mut entries.keys[at..at + 8 * count];
-            for k in n as usize..8 * count {
+            let keys = &mut entries.keys[at..at + n.next_multiple_of(ROOM)];
+            for k in n..keys.len() {
                 keys[k] = keys[0];
             }
-            let (keys, out) = (keys.as_chunks::<8>().0, &mut shades.0[..count]);
-            let (ids, known, found) = (&ids, &known, &mut []);
-            Shade::<true> { frame, draw, ids, known, found, keys, corner, out }.colors();
-            for i in 0..count {
-                colors.put(&I8(keys[i]), (n as usize - 8 * i).min(8), &shades.0[i]);
+            if draw.clay {
+                let (id, known, out) = (ids[0][0], &known, &mut *shades);
+                Clay { frame, draw, id, known, keys, n, corner, out }.colors();
+            } else {
+                let keys = &keys.as_chunks::<8>().0[..n.div_ceil(8)];
+                let (ids, known, found, out) = (&ids, &known, &mut [], &mut *shades);
+                Shade::<true> { frame, draw, ids, known, found, keys, corner, out }.colors();
             }
-            done += n;
+            for (i, keys) in keys.as_chunks::<8>().0[..n.div_ceil(8)].iter().enumerate() {
+                colors.put(&I(*keys), (n - 8 * i).min(8), &shades.batch(i));
+            }
+            done += n as u32;
         }
         stats.shaded += done as u64;
     }
@@ -112,14 +139,14 @@ fn chain(frame: &Frame, area: Area, k: usize, scratch: &mut TileScratch) {
 
 /// Where evaluations are made, from the picture's centre; `corner` is the tile's first pixel.
 #[inline(always)]
-pub(super) fn points(corner: [f32; 2], keys: &I8) -> [F8; 2] {
-    let px = (*keys & I8::splat(TILE as i32 - 1)).to_f32() + corner[0];
-    let py = (keys.shift_right(6) & I8::splat(TILE as i32 - 1)).to_f32() + corner[1];
-    if keys.shift_right(12).equal(I8::splat(WHOLE as i32)).all() {
+pub(super) fn points<const N: usize>(corner: [f32; 2], keys: &I<N>) -> [F<N>; 2] {
+    let px = (*keys & I::splat(TILE as i32 - 1)).to_f32() + corner[0];
+    let py = (keys.shift_right(6) & I::splat(TILE as i32 - 1)).to_f32() + corner[1];
+    if !I::splat(WHOLE as i32).gt(keys.shift_right(12)).any() {
         return [px, py];
     }
-    let (mut cx, mut cy) = (F8::ZERO, F8::ZERO);
-    for k in 0..8 {
+    let (mut cx, mut cy) = (F::ZERO, F::ZERO);
+    for k in 0..N {
         [cx.0[k], cy.0[k]] = CENTROIDS[covers(keys.0[k]) as usize];
     }
     [px + cx, py + cy]
@@ -188,14 +215,14 @@ struct Waiting {
     keys: [[Key; 8]; BATCHES],
     ids: [[u32; 8]; BATCHES],
     found: [Corners; BATCHES],
-    rgba: [[F8; 4]; BATCHES],
+    rgba: Shades,
     n: usize,
 }
 
 impl Waiting {
     #[inline(always)]
     fn new() -> Self {
-        let (found, rgba) = ([Corners::NONE; BATCHES], [[F8::ZERO; 4]; BATCHES]);
+        let (found, rgba) = ([Corners::NONE; BATCHES], Shades::default());
         Self { keys: [[0; 8]; BATCHES], ids: [[0; 8]; BATCHES], found, rgba, n: 0 }
     }
 
@@ -220,7 +247,7 @@ impl Waiting {
     fn shade(&mut self, frame: &Frame, draw: &Draw, area: Area, colors: &mut Colors) {
         let batches = self.colors(frame, draw, area);
         for i in 0..batches {
-            colors.put(&I8(self.keys[i]), (self.n - 8 * i).min(8), &self.rgba[i]);
+            colors.put(&I(self.keys[i]), (self.n - 8 * i).min(8), &self.rgba.batch(i));
         }
         self.n = 0;
     }
@@ -239,7 +266,7 @@ impl Waiting {
                 *id -= draw.first_triangle;
             }
         }
-        let (keys, ids, out) = (&self.keys[..batches], &self.ids[..batches], &mut self.rgba[..batches]);
+        let (keys, ids, out) = (&self.keys[..batches], &self.ids[..batches], &mut self.rgba);
         let (known, corner, found) = (&[Vec4::ZERO; 3], area.corner(frame), &mut self.found[..batches]);
         Shade::<false> { frame, draw, ids, known, found, keys, corner, out }.colors();
         batches
@@ -313,8 +340,8 @@ pub(super) fn shade_list(
         rest[..n].iter().for_each(|l| waiting.push(key(l.place as usize, l.mask as u32), l.id));
         waiting.colors(frame, draw, area);
         for k in 0..n {
-            let c = &waiting.rgba[k / 8];
-            out.push([c[0].0[k % 8], c[1].0[k % 8], c[2].0[k % 8], c[3].0[k % 8]]);
+            let c = &waiting.rgba.0;
+            out.push([c[0][k], c[1][k], c[2][k], c[3][k]]);
         }
         rest = &rest[n..];
     }

@@ -8,9 +8,9 @@ use super::fill::NONE;
 use super::frame::Frame;
 use super::merge;
 use super::resolve::Area;
-use super::setup::{Bins, Bounds, TileBin};
+use super::setup::Bins;
 use super::tile::TileScratch;
-use crate::math::simd::I8;
+use crate::math::simd::{I, I8};
 
 /// All samples of a pixel.
 pub(super) const WHOLE: u32 = 0xf;
@@ -52,6 +52,9 @@ struct Run {
     length: u32,
 }
 
+/// Places beyond the end of a chain: as many as the widest kernel has lanes.
+pub(super) const ROOM: usize = 16;
+
 /// Slots of the table: more than chains can be in a tile.
 const SLOTS: usize = 1 << 14;
 
@@ -62,7 +65,7 @@ const DENSE: usize = 40;
 #[derive(Debug, Default)]
 pub(super) struct Entries {
     pub chains: Vec<Chain>,
-    /// Evaluations by chain, each followed by room for eight more.
+    /// Evaluations by chain, each followed by [`ROOM`].
     pub keys: Vec<Key>,
     runs: Vec<Run>,
     /// Parts of pixels of the block at hand.
@@ -126,35 +129,56 @@ impl Entries {
         }
     }
 
-    /// List the pixels of a rectangle that show a triangle; their number.
+    /// List the pixels that show a triangle among those where it won; their number.
     #[inline(always)]
-    fn find(&mut self, ids: &[u32], id: u32, x: [i32; 2], y: [i32; 2]) -> u32 {
-        let first = self.chains.last().map_or(0, |c| c.first + c.count + 8);
-        let (left, right) = (x[0] as usize / 8, x[1] as usize / 8);
-        let most = first as usize + (y[1] - y[0] + 1) as usize * (right - left + 1) * 8 + 8;
+    fn find(&mut self, ids: &[u32; TILE * TILE], id: u32, places: &[u16]) -> u32 {
+        let last = self.chains.last().copied();
+        let first = last.map_or(0, |c| c.first + c.count + ROOM as u32);
+        let most = first as usize + 8 * places.len() + ROOM;
         if self.keys.len() < most {
-            self.keys.resize(most, 0);
+            self.keys.resize(2 * most, 0);
         }
-        let (keys, mut at) = (&mut self.keys[..most], first as usize);
-        for row in y[0] as usize..=y[1] as usize {
-            for block in left..=right {
-                let place = row * TILE + 8 * block;
-                let mut mask = load(&ids[place..]).equal(I8::splat(id as i32)).bitmask();
-                while mask != 0 {
-                    let k = mask.trailing_zeros();
-                    // What is written beyond the run's end is overwritten by the next.
-                    let run = I8::splat(key(place + k as usize, WHOLE)) + I8::IOTA;
-                    keys[at..at + 8].copy_from_slice(&run.0);
-                    at += (!(mask >> k)).trailing_zeros() as usize;
-                    mask &= mask + (1 << k);
-                }
+        let (keys, mut n) = (&mut self.keys[first as usize..most], 0);
+        for &place in places {
+            let place = (place as usize).min(TILE * TILE - 8);
+            let mut mask = load(&ids[place..]).equal(I8::splat(id as i32)).bitmask();
+            while mask != 0 {
+                let k = mask.trailing_zeros();
+                // What is written beyond the run's end is overwritten by the next.
+                let run = I8::splat(key(place + k as usize, WHOLE)) + I8::IOTA;
+                keys[n..n + 8].copy_from_slice(&run.0);
+                n += (!(mask >> k)).trailing_zeros() as usize;
+                mask &= mask + (1 << k);
             }
         }
-        let count = at as u32 - first;
-        if count > 0 {
-            self.chains.push(Chain { id, count, first, slot: 0 });
+        if n > 0 {
+            self.chains.push(Chain { id, count: n as u32, first, slot: 0 });
         }
-        count
+        // Parts of one clipped triangle follow each other, and where they meet both have won.
+        match last {
+            Some(before) if before.id == id && n > 0 => self.join(before),
+            _ => n as u32,
+        }
+    }
+
+    /// Make one of the last two chains, of which the first is known; by how much it grew.
+    #[inline(never)]
+    fn join(&mut self, before: Chain) -> u32 {
+        let after = self.chains.pop().expect("it was pushed");
+        let end = after.first as usize + after.count as usize;
+        self.keys.copy_within(after.first as usize..end, (before.first + before.count) as usize);
+        let all = (before.count + after.count) as usize;
+        let keys = &mut self.keys[before.first as usize..][..all];
+        keys.sort_unstable();
+        let mut count = 0;
+        for k in 0..all {
+            if k == 0 || keys[k] != keys[k - 1] {
+                keys[count] = keys[k];
+                count += 1;
+            }
+        }
+        self.chains.last_mut().expect("the one before").count = count as u32;
+        count as u32 - before.count
     }
 
     /// Lay out the runs by chain.
@@ -163,7 +187,7 @@ impl Entries {
         let mut end = 0;
         for c in &mut self.chains {
             c.first = end;
-            end += c.count + 8;
+            end += c.count + ROOM as u32;
             c.count = 0;
         }
         self.keys.resize(self.keys.len().max(end as usize), 0);
@@ -179,28 +203,17 @@ impl Entries {
     }
 }
 
-/// Find what has to be shaded in a tile at one sample a pixel: every triangle is looked for where it can be, which takes a third of the
-/// time of sorting what is seen.
+/// Find what has to be shaded in a tile at one sample a pixel: every triangle is looked for where it has won.
 #[inline(always)]
-pub(super) fn look(frame: &Frame, bins: &[Bins], tile: usize, area: Area, scratch: &mut TileScratch) {
+pub(super) fn look(bins: &[Bins], tile: usize, scratch: &mut TileScratch) {
     let TileScratch { entries, seen, stats, .. } = scratch;
     entries.start();
+    let ids = seen.id[..TILE * TILE].try_into().expect("a tile");
+    for (id, places) in seen.places.iter() {
+        stats.samples += entries.find(ids, id, places) as u64;
+    }
     for bins in bins {
-        let TileBin { solid, fragments, .. } = &bins.tiles[tile];
-        let setup = |s: u32| &bins.setups[s as usize];
-        // Parts of one clipped triangle follow each other.
-        for parts in solid.chunk_by(|a, b| setup(*a).id == setup(*b).id) {
-            let (mut x, mut y) = ([i32::MAX, 0], [i32::MAX, 0]);
-            for &s in parts {
-                let b = Bounds::of(frame, setup(s).x, setup(s).y).within(area.origin);
-                (x, y) = ([x[0].min(b.x[0]), x[1].max(b.x[1])], [y[0].min(b.y[0]), y[1].max(b.y[1])]);
-            }
-            if x[0] <= x[1] && y[0] <= y[1] {
-                seen.touch(x, y);
-                stats.samples += entries.find(&seen.id, setup(parts[0]).id, x, y) as u64;
-            }
-        }
-        for f in fragments {
+        for f in &bins.tiles[tile].fragments {
             if seen.id[f.place as usize] == f.id {
                 entries.loose.push(key(f.place as usize, WHOLE));
                 entries.loose_ids.push(f.id);
@@ -245,10 +258,10 @@ fn block(frame: &Frame, area: Area, [x, y]: [usize; 2], scratch: &mut TileScratc
         }
 
         // A run starts where something is that differs from what lies left of it.
-        let mut shifted = I8([NONE as i32; 8]);
+        let mut shifted = I([NONE as i32; 8]);
         shifted.0[1..].copy_from_slice(&row.0[..7]);
         let same = row.equal(shifted).bitmask();
-        let there = !row.equal(I8([NONE as i32; 8])).bitmask() & columns;
+        let there = !row.equal(I([NONE as i32; 8])).bitmask() & columns;
         whole += there.count_ones();
         let mut starts = there & !same;
         while starts != 0 {

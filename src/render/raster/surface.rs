@@ -1,9 +1,9 @@
 //! What a triangle's corners give at a pixel: perspective-correct varyings.
 
 use super::frame::{Class, Draw, Frame, Projector};
-use super::resolve;
+use super::resolve::{self, Shades};
 use super::scan::Key;
-use crate::math::simd::{self, F8, I8, Kernel, V8};
+use crate::math::simd::{self, F8, I, I8, Kernel, V8};
 use crate::render::material::{self, Points};
 use crate::render::sample::Uv;
 use crate::render::varying::{self, Slopes, Varying, corners, mix, vectors};
@@ -145,7 +145,7 @@ pub(super) struct Shade<'a, const ONE: bool> {
     /// The tile's first pixel, from the picture's centre.
     pub corner: [f32; 2],
     /// Linear light, premultiplied, and alpha.
-    pub out: &'a mut [[F8; 4]],
+    pub out: &'a mut Shades,
 }
 
 impl<const ONE: bool> Shade<'_, ONE> {
@@ -166,15 +166,16 @@ impl<const ONE: bool> Kernel for Shade<'_, ONE> {
         if !ONE {
             Corners::look_up(draw.object, ids, found);
         }
-        for (i, (keys, out)) in keys.iter().zip(out).enumerate() {
-            let [px, py] = resolve::points(corner, &I8(*keys));
+        for (i, keys) in keys.iter().enumerate() {
+            let [px, py] = resolve::points(corner, &I(*keys));
             let found = if ONE { &Corners::NONE } else { &found[i] };
             let seen = seen::<ONE>(frame, draw, ids[0][0], known, found, px, py);
             let (c, alpha) = material::light(frame.isa, frame.scene, draw.material, &seen);
-            *out = match draw.class {
+            let rgba = match draw.class {
                 Class::Blend => [c.x * alpha, c.y * alpha, c.z * alpha, alpha],
                 _ => [c.x, c.y, c.z, alpha],
             };
+            out.set(i, &rgba);
         }
     }
 }

@@ -3,8 +3,8 @@
 
 use super::stage::{Body, Hit, Real, Spot};
 use super::wave::Path;
-use crate::math::lanes::{Lanes, V3};
-use crate::math::simd::{self, F8, I8, Isa, Kernel, V8};
+use crate::math::lanes::{Lanes, Mask, V3};
+use crate::math::simd::{self, F, F8, I8, Isa, Kernel, V8};
 use crate::render::material::{self, Points};
 use crate::render::sample::Uv;
 use crate::render::shade::{self, Lamp, Surface};
@@ -179,7 +179,7 @@ impl<'a> Batch<'a> {
     #[inline(always)]
     fn on_object(&self) -> Option<Varying<'a, false, Spread>> {
         let object = self.body.and_then(|b| b.object)?;
-        let b = [0, 1, 2].map(|i| F8(self.spots.each_ref().map(|s| s.b[i] as f32)));
+        let b = [0, 1, 2].map(|i| F(self.spots.each_ref().map(|s| s.b[i] as f32)));
         let moved = [0, 1].map(|axis| {
             gather(|k| {
                 let s = &self.paths[k].spread;
