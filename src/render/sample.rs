@@ -2,7 +2,7 @@
 
 use crate::image::color::LINEAR_OF_SRGB8;
 use crate::math::simd::{self, F8, I8, Isa, Kernel};
-use crate::scene::texels::{Level, PACKED};
+use crate::scene::texels::{self, Level, PACKED};
 use crate::scene::{Filter, Texture, WrapMode};
 use std::sync::LazyLock;
 
@@ -57,10 +57,10 @@ fn filtered(t: &Texture, uv: &Uv) -> [F8; 4] {
     let next = (level + I8::splat(1)).min(I8::splat(top as i32));
     let blended = fraction.gt(F8::ZERO).any();
     let mut sum = [F8::ZERO; 4];
-    if matches!(t.texels(level.0[0] as usize), Level::Packed(_)) {
-        add_packed(t, uv, level, F8::ONE - fraction, &mut sum);
+    if let Some(levels) = t.packed() {
+        add_packed(t, levels, uv, level, F8::ONE - fraction, &mut sum);
         if blended {
-            add_packed(t, uv, next, fraction, &mut sum);
+            add_packed(t, levels, uv, next, fraction, &mut sum);
         }
         for c in 0..3 {
             sum[c] = sum[c] * (1.0 / (PACKED[c] * PACKED[c]));
@@ -197,17 +197,20 @@ fn around(t: &Texture, uv: &Uv, level: I8, same: bool, weight: F8) -> ([I8; 2], 
 /// A channel is decoded by one product, and a level takes half the memory of one in linear light, which matters most: texels
 /// come from far away.
 #[inline(always)]
-fn add_packed(t: &Texture, uv: &Uv, level: I8, weight: F8, sum: &mut [F8; 4]) {
+fn add_packed(t: &Texture, levels: &[Level<u32>], uv: &Uv, level: I8, weight: F8, sum: &mut [F8; 4]) {
     let same = level.equal(I8::splat(level.0[0])).all();
     let (at, weights) = around(t, uv, level, same, weight);
-    let mut levels = [packed(t, level.0[0]); 8];
-    if !same {
-        for k in 1..8 {
-            levels[k] = packed(t, level.0[k]);
-        }
+    let (mut whole, mut all) = ([&[][..]; 8], true);
+    for k in 0..if same { 1 } else { 8 } {
+        let texels = levels[level.0[k] as usize].whole();
+        (whole[k], all) = (texels.unwrap_or_default(), all & texels.is_some());
     }
     for j in 0..2 {
-        let [left, right] = if same { pairs::<true>(&levels, at[j]) } else { pairs::<false>(&levels, at[j]) };
+        let [left, right] = match (all, same) {
+            (true, true) => pairs::<true>(&whole, at[j]),
+            (true, false) => pairs::<false>(&whole, at[j]),
+            _ => pieces(t, levels, level, at[j]),
+        };
         add_squares(sum, left, weights[j][0]);
         add_squares(sum, right, weights[j][1]);
     }
@@ -225,12 +228,16 @@ fn pairs<const SAME: bool>(levels: &[&[u32]; 8], at: I8) -> [I8; 2] {
     [left, right]
 }
 
-#[inline(always)]
-fn packed(t: &Texture, level: i32) -> &[u32] {
-    match t.texels(level as usize) {
-        Level::Packed(texels) => texels,
-        Level::Wide(_) => &[],
+/// The same where not all of a level is there.
+#[inline(never)]
+fn pieces(t: &Texture, levels: &[Level<u32>], level: I8, at: I8) -> [I8; 2] {
+    let (mut left, mut right) = (I8::ZERO, I8::ZERO);
+    for k in 0..8 {
+        let number = level.0[k] as usize;
+        let pair = levels[number].pair(at.0[k] as u32 as usize, |range| texels::packed(t, number, range));
+        (left.0[k], right.0[k]) = (pair[0] as i32, pair[1] as i32);
     }
+    [left, right]
 }
 
 #[inline(always)]
@@ -251,12 +258,15 @@ fn add_squares(sum: &mut [F8; 4], texel: I8, weight: F8) {
 fn add_wide(t: &Texture, uv: &Uv, level: I8, weight: F8, sum: &mut [F8; 4]) {
     let (at, weights) = around(t, uv, level, false, weight * (1.0 / 65535.0));
     for k in 0..8 {
-        let Level::Wide(texels) = t.texels(level.0[k] as usize) else { return };
-        let row = |j: usize| &texels[4 * at[j].0[k] as usize..][..8];
+        let number = level.0[k] as usize;
+        let texels = &t.wide()[number];
+        let row = |j: usize| texels.pair(at[j].0[k] as usize, |range| texels::wide(t, number, range));
         let (upper, lower) = (row(0), row(1));
         for c in 0..4 {
-            let mean = |row: &[u16], w: &[F8; 2]| row[c] as f32 * w[0].0[k] + row[c + 4] as f32 * w[1].0[k];
-            sum[c].0[k] += mean(upper, &weights[0]) + mean(lower, &weights[1]);
+            let mean = |row: &[[u16; 4]; 2], w: &[F8; 2]| {
+                row[0][c] as f32 * w[0].0[k] + row[1][c] as f32 * w[1].0[k]
+            };
+            sum[c].0[k] += mean(&upper, &weights[0]) + mean(&lower, &weights[1]);
         }
     }
 }

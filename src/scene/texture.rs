@@ -85,7 +85,7 @@ impl Texture {
         }
         let opaque = rgba.chunks(4096).all(|c| c.as_chunks::<4>().0.iter().fold(255, |a, t| a & t[3]) == 255);
         let levels = super::mips::chain(width, height, rgba, content);
-        let texels = Texels::new(levels.len(), opaque && content != Content::Numbers);
+        let texels = Texels::new(width, height, levels.len(), opaque && content != Content::Numbers);
         Ok(Self { width, height, content, wrap, filter, levels, texels })
     }
 
@@ -119,12 +119,21 @@ impl Texture {
         &self.levels
     }
 
-    /// A level for filters.
+    /// The levels for filters, if they are packed.
     #[inline(always)]
-    pub(crate) fn texels(&self, level: usize) -> &Level {
-        self.texels.get(level, self.srgb(), || {
-            let w = (self.width >> level).max(1) as usize;
-            (&self.levels[level], w, self.wrap[0] == WrapMode::Repeat)
-        })
+    pub(crate) fn packed(&self) -> Option<&[Level<u32>]> {
+        match &self.texels {
+            Texels::Packed(levels) => Some(levels),
+            Texels::Wide(_) => None,
+        }
+    }
+
+    /// The levels for filters, if they are not packed.
+    #[inline(always)]
+    pub(crate) fn wide(&self) -> &[Level<[u16; 4]>] {
+        match &self.texels {
+            Texels::Packed(_) => &[],
+            Texels::Wide(levels) => levels,
+        }
     }
 }

@@ -201,6 +201,7 @@ fn codes(c: F8, steps: &[u32; 2048]) -> I8 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::simd::F;
 
     #[test]
     fn eight_at_a_time_gives_the_bytes_of_one_at_a_time() {
