@@ -289,30 +289,25 @@ impl<const N: usize> I<N> {
     /// Any sign set.
     #[inline(always)]
     pub fn any(self) -> bool {
-        let (mut signs, mut i) = (0, 0);
-        while i < N {
-            signs |= self.0[i];
-            i += 1;
-        }
-        signs < 0
-    }
-}
-
-impl I8 {
-    /// One bit a lane: the sign.
-    #[inline(always)]
-    pub fn bitmask(self) -> u32 {
-        // glam knows the one instruction for four signs.
-        let f = self.from_bits().0;
-        let low = Vec4::new(f[0], f[1], f[2], f[3]).is_negative_bitmask();
-        let high = Vec4::new(f[4], f[5], f[6], f[7]).is_negative_bitmask();
-        low | high << 4
+        self.bitmask() != 0
     }
 
     /// All signs set.
     #[inline(always)]
     pub fn all(self) -> bool {
-        self.bitmask() == 0xff
+        self.bitmask() == (1 << N) - 1
+    }
+
+    /// One bit a lane, for at most 16 of them: the sign.
+    #[inline(always)]
+    pub fn bitmask(self) -> u32 {
+        // glam knows the one instruction for four signs.
+        let (f, mut mask, mut i) = (self.from_bits().0, 0, 0);
+        while i < N {
+            mask |= Vec4::new(f[i], f[i + 1], f[i + 2], f[i + 3]).is_negative_bitmask() << i;
+            i += 4;
+        }
+        mask
     }
 }
 
@@ -386,7 +381,7 @@ pub fn exp2<const N: usize>(x: F<N>) -> F<N> {
 #[inline(always)]
 pub fn pow<const N: usize>(x: F<N>, y: F<N>) -> F<N> {
     let n = y.0[0] as i32;
-    if (1..=64).contains(&n) && !(!y.equal(F::splat(n as f32))).any() {
+    if (1..=64).contains(&n) && y.equal(F::splat(n as f32)).all() {
         return whole_power(x, n as u32);
     }
     let tiny = F::splat(1e-37);
@@ -457,22 +452,32 @@ pub fn run<K: Kernel>(isa: Isa, kernel: K) -> K::Output {
 pub fn run_wide<K: WideKernel>(isa: Isa, kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
     if isa == Isa::Best && *HAS_AVX512 {
+        return run_as::<16, _>(isa, Wide::<K, 16>(kernel));
+    }
+    run(isa, Wide::<K, 8>(kernel))
+}
+
+/// Run a kernel of `N` lanes as the kernel of [`run_wide`] that calls it.
+#[inline]
+pub fn run_as<const N: usize, K: Kernel>(isa: Isa, kernel: K) -> K::Output {
+    #[cfg(target_arch = "x86_64")]
+    if N == 16 && isa == Isa::Best && *HAS_AVX512 {
         // What calling it needs has just been checked.
         #[allow(unsafe_code)]
         return unsafe { run_avx512(kernel) };
     }
-    run(isa, Eight(kernel))
+    run(isa, kernel)
 }
 
-/// A kernel of any number of lanes, with eight.
-struct Eight<K>(K);
+/// A kernel of any number of lanes, with `N`.
+struct Wide<K, const N: usize>(K);
 
-impl<K: WideKernel> Kernel for Eight<K> {
+impl<K: WideKernel, const N: usize> Kernel for Wide<K, N> {
     type Output = K::Output;
 
     #[inline(always)]
     fn run(self) -> K::Output {
-        self.0.run::<8>()
+        self.0.run::<N>()
     }
 }
 
@@ -504,8 +509,8 @@ fn run_avx2<K: Kernel>(kernel: K) -> K::Output {
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,bmi1,bmi2,lzcnt,popcnt")]
-fn run_avx512<K: WideKernel>(kernel: K) -> K::Output {
-    kernel.run::<16>()
+fn run_avx512<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run()
 }
 
 #[cfg(test)]

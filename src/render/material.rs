@@ -34,7 +34,7 @@ struct Maps<'a, const ANY: bool> {
 
 /// All maps of a material.
 #[inline(always)]
-pub(crate) fn maps(m: &Material) -> impl Iterator<Item = &TextureRef> {
+fn maps(m: &Material) -> impl Iterator<Item = &TextureRef> {
     let maps = [&m.diffuse_map, &m.specular_map, &m.emissive_map, &m.normal_map, &m.occlusion_map];
     maps.into_iter().flatten()
 }

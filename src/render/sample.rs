@@ -1,7 +1,7 @@
 //! Textures at eight points: wrapping, mip levels, filtering (notes §5.12).
 
 use crate::image::color::LINEAR_OF_SRGB8;
-use crate::math::simd::{self, F8, I8, Isa, Kernel};
+use crate::math::simd::{self, F, I, Isa, Kernel};
 use crate::scene::texels::{self, Level, PACKED};
 use crate::scene::{Filter, Texture, WrapMode};
 use std::sync::LazyLock;
@@ -9,65 +9,65 @@ use std::sync::LazyLock;
 /// Each 8-bit value as a fraction of one.
 static UNIT8: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| i as f32 / 255.0));
 
-/// Texture coordinates of eight points and how they change from pixel to pixel.
+/// Texture coordinates of points and how they change from pixel to pixel.
 #[derive(Clone, Copy)]
-pub(crate) struct Uv {
-    pub u: F8,
-    pub v: F8,
+pub(crate) struct Uv<const N: usize = 8> {
+    pub u: F<N>,
+    pub v: F<N>,
     /// Change of u and v a pixel to the right.
-    pub right: [F8; 2],
+    pub right: [F<N>; 2],
     /// Change of u and v a pixel down.
-    pub down: [F8; 2],
+    pub down: [F<N>; 2],
 }
 
 impl Uv {
-    pub const ZERO: Self = Self { u: F8::ZERO, v: F8::ZERO, right: [F8::ZERO; 2], down: [F8::ZERO; 2] };
+    pub const ZERO: Self = Self { u: F::ZERO, v: F::ZERO, right: [F::ZERO; 2], down: [F::ZERO; 2] };
 }
 
 /// Linear RGBA, straight alpha.
 ///
 /// The level is `log₂` of the longer side of the pixel's footprint in texels.
-pub(crate) fn sample(isa: Isa, texture: &Texture, uv: &Uv) -> [F8; 4] {
-    simd::run(isa, Lookup { texture, uv })
+pub(crate) fn sample<const N: usize>(isa: Isa, texture: &Texture, uv: &Uv<N>) -> [F<N>; 4] {
+    simd::run_as::<N, _>(isa, Lookup { texture, uv })
 }
 
-struct Lookup<'a> {
+struct Lookup<'a, const N: usize> {
     texture: &'a Texture,
-    uv: &'a Uv,
+    uv: &'a Uv<N>,
 }
 
-impl Kernel for Lookup<'_> {
-    type Output = [F8; 4];
+impl<const N: usize> Kernel for Lookup<'_, N> {
+    type Output = [F<N>; 4];
 
     #[inline(always)]
-    fn run(self) -> [F8; 4] {
+    fn run(self) -> [F<N>; 4] {
         filtered(self.texture, self.uv)
     }
 }
 
 #[inline(always)]
-fn filtered(t: &Texture, uv: &Uv) -> [F8; 4] {
+fn filtered<const N: usize>(t: &Texture, uv: &Uv<N>) -> [F<N>; 4] {
     let top = (t.levels().len() - 1) as f32;
-    let lod = if top > 0.0 { lod(t, uv).max(F8::ZERO).min(F8::splat(top)) } else { F8::ZERO };
+    let lod = if top > 0.0 { lod(t, uv).max(F::ZERO).min(F::splat(top)) } else { F::ZERO };
     if t.filter() == Filter::Nearest {
         return nearest(t, uv, lod.round());
     }
     let level = lod.floor();
     let fraction = lod - level.to_f32();
-    let next = (level + I8::splat(1)).min(I8::splat(top as i32));
-    let blended = fraction.gt(F8::ZERO).any();
-    let mut sum = [F8::ZERO; 4];
+    let next = (level + I::splat(1)).min(I::splat(top as i32));
+    let blended = fraction.gt(F::ZERO).any();
+    let mut sum = [F::ZERO; 4];
     if let Some(levels) = t.packed() {
-        add_packed(t, levels, uv, level, F8::ONE - fraction, &mut sum);
+        add_packed(t, levels, uv, level, F::ONE - fraction, &mut sum);
         if blended {
             add_packed(t, levels, uv, next, fraction, &mut sum);
         }
         for c in 0..3 {
             sum[c] = sum[c] * (1.0 / (PACKED[c] * PACKED[c]));
         }
-        return [sum[0], sum[1], sum[2], F8::ONE];
+        return [sum[0], sum[1], sum[2], F::ONE];
     }
-    add_wide(t, uv, level, F8::ONE - fraction, &mut sum);
+    add_wide(t, uv, level, F::ONE - fraction, &mut sum);
     if blended {
         add_wide(t, uv, next, fraction, &mut sum);
     }
@@ -75,24 +75,24 @@ fn filtered(t: &Texture, uv: &Uv) -> [F8; 4] {
 }
 
 #[inline(always)]
-fn lod(t: &Texture, uv: &Uv) -> F8 {
+fn lod<const N: usize>(t: &Texture, uv: &Uv<N>) -> F<N> {
     let (w, h) = (t.width() as f32, t.height() as f32);
-    let square = |d: [F8; 2]| {
+    let square = |d: [F<N>; 2]| {
         let (x, y) = (d[0] * w, d[1] * h);
         x * x + y * y
     };
     let footprint = square(uv.right).max(square(uv.down));
-    simd::log2(footprint.max(F8::splat(1e-12)).min(F8::splat(1e12))) * 0.5
+    simd::log2(footprint.max(F::splat(1e-12)).min(F::splat(1e12))) * 0.5
 }
 
 /// Sizes of each lane's level along one side.
 #[inline(always)]
-fn size(full: u32, level: I8, same: bool) -> I8 {
+fn size<const N: usize>(full: u32, level: I<N>, same: bool) -> I<N> {
     if same {
-        return I8::splat((full >> (level.0[0] & 31)).max(1) as i32);
+        return I::splat((full >> (level.0[0] & 31)).max(1) as i32);
     }
-    let mut s = I8::ZERO;
-    for k in 0..8 {
+    let mut s = I::ZERO;
+    for k in 0..N {
         s.0[k] = (full >> (level.0[k] & 31)).max(1) as i32;
     }
     s
@@ -100,14 +100,14 @@ fn size(full: u32, level: I8, same: bool) -> I8 {
 
 /// A coordinate into 0…1, as far as that can be said before texels are counted.
 #[inline(always)]
-fn wrapped(x: F8, mode: WrapMode) -> F8 {
+fn wrapped<const N: usize>(x: F<N>, mode: WrapMode) -> F<N> {
     // Beyond 2²² no fraction is left, and NaN becomes a number here.
-    let x = x.max(F8::splat(-4e6)).min(F8::splat(4e6));
+    let x = x.max(F::splat(-4e6)).min(F::splat(4e6));
     match mode {
         WrapMode::Repeat => x - x.floor().to_f32(),
         WrapMode::Mirror => {
             let t = x - (x * 0.5).floor().to_f32() * 2.0;
-            t.min(F8::splat(2.0) - t)
+            t.min(F::splat(2.0) - t)
         }
         WrapMode::Clamp => x.clamp01(),
     }
@@ -115,17 +115,17 @@ fn wrapped(x: F8, mode: WrapMode) -> F8 {
 
 /// Texels by lane, as little-endian RGBA words.
 #[inline(always)]
-fn fetch(t: &Texture, level: I8, at: I8) -> I8 {
-    let mut out = I8::ZERO;
+fn fetch<const N: usize>(t: &Texture, level: I<N>, at: I<N>) -> I<N> {
+    let mut out = I::ZERO;
     let first = level.0[0] as usize;
-    if level == I8::splat(level.0[0]) {
+    if level == I::splat(level.0[0]) {
         let texels = t.levels()[first].as_chunks::<4>().0;
-        for k in 0..8 {
+        for k in 0..N {
             out.0[k] = i32::from_le_bytes(texels[at.0[k] as usize]);
         }
         return out;
     }
-    for k in 0..8 {
+    for k in 0..N {
         let texels = t.levels()[level.0[k] as usize].as_chunks::<4>().0;
         out.0[k] = i32::from_le_bytes(texels[at.0[k] as usize]);
     }
@@ -134,15 +134,15 @@ fn fetch(t: &Texture, level: I8, at: I8) -> I8 {
 
 /// Add `weight` times a texel's linear colour.
 #[inline(always)]
-fn add(sum: &mut [F8; 4], texel: I8, weight: F8, table: &[f32; 256]) {
+fn add<const N: usize>(sum: &mut [F<N>; 4], texel: I<N>, weight: F<N>, table: &[f32; 256]) {
     for c in 0..3 {
-        let mut value = F8::ZERO;
-        for k in 0..8 {
+        let mut value = F::ZERO;
+        for k in 0..N {
             value.0[k] = table[(texel.0[k] as u32 >> (8 * c) & 255) as usize];
         }
         sum[c] = sum[c] + value * weight;
     }
-    let alpha = (texel.shift_right(24) & I8::splat(255)).to_f32() / F8::splat(255.0);
+    let alpha = (texel.shift_right(24) & I::splat(255)).to_f32() / F::splat(255.0);
     sum[3] = sum[3] + alpha * weight;
 }
 
@@ -152,43 +152,49 @@ fn table(t: &Texture) -> &'static [f32; 256] {
 }
 
 #[inline(always)]
-fn nearest(t: &Texture, uv: &Uv, level: I8) -> [F8; 4] {
+fn nearest<const N: usize>(t: &Texture, uv: &Uv<N>, level: I<N>) -> [F<N>; 4] {
     let (w, h) = (size(t.width(), level, false), size(t.height(), level, false));
     let [wrap_u, wrap_v] = t.wrap();
-    let index = |x: F8, size: I8| (x * size.to_f32()).floor().max(I8::ZERO).min(size - I8::splat(1));
+    let index = |x: F<N>, size: I<N>| (x * size.to_f32()).floor().max(I::ZERO).min(size - I::splat(1));
     let (x, y) = (index(wrapped(uv.u, wrap_u), w), index(wrapped(uv.v, wrap_v), h));
-    let mut sum = [F8::ZERO; 4];
-    add(&mut sum, fetch(t, level, y * w + x), F8::ONE, table(t));
+    let mut sum = [F::ZERO; 4];
+    add(&mut sum, fetch(t, level, y * w + x), F::ONE, table(t));
     sum
 }
 
 /// The two texels on either side of a point along an axis, the weight of the second; centres are at half-integers.
 #[inline(always)]
-fn neighbours(x: F8, size: I8, mode: WrapMode) -> (I8, I8, F8) {
+fn neighbours<const N: usize>(x: F<N>, size: I<N>, mode: WrapMode) -> (I<N>, I<N>, F<N>) {
     let x = wrapped(x, mode) * size.to_f32() + -0.5;
-    let last = size - I8::splat(1);
+    let last = size - I::splat(1);
     if mode != WrapMode::Repeat {
-        let x = x.max(F8::ZERO).min(last.to_f32());
+        let x = x.max(F::ZERO).min(last.to_f32());
         let first = x.floor();
-        return (first, (first + I8::splat(1)).min(last), x - first.to_f32());
+        return (first, (first + I::splat(1)).min(last), x - first.to_f32());
     }
     let first = x.floor();
     let fraction = x - first.to_f32();
-    let first = I8::ZERO.gt(first).select_int(last, first).min(last);
-    let second = first.equal(last).select_int(I8::ZERO, first + I8::splat(1));
+    let first = I::ZERO.gt(first).select_int(last, first).min(last);
+    let second = first.equal(last).select_int(I::ZERO, first + I::splat(1));
     (first, second, fraction)
 }
 
 /// Where the four texels around each point are: the first of two in the upper row and in the lower, and the weights of all.
 #[inline(always)]
-fn around(t: &Texture, uv: &Uv, level: I8, same: bool, weight: F8) -> ([I8; 2], [[F8; 2]; 2]) {
+fn around<const N: usize>(
+    t: &Texture,
+    uv: &Uv<N>,
+    level: I<N>,
+    same: bool,
+    weight: F<N>,
+) -> ([I<N>; 2], [[F<N>; 2]; 2]) {
     let (w, h) = (size(t.width(), level, same), size(t.height(), level, same));
     let [wrap_u, wrap_v] = t.wrap();
     let (x, _, fx) = neighbours(uv.u, w, wrap_u);
     let (y0, y1, fy) = neighbours(uv.v, h, wrap_v);
-    let stride = w + I8::splat(1);
-    let (upper, lower) = ((F8::ONE - fy) * weight, fy * weight);
-    let left = F8::ONE - fx;
+    let stride = w + I::splat(1);
+    let (upper, lower) = ((F::ONE - fy) * weight, fy * weight);
+    let left = F::ONE - fx;
     ([y0 * stride + x, y1 * stride + x], [[upper * left, upper * fx], [lower * left, lower * fx]])
 }
 
@@ -197,18 +203,25 @@ fn around(t: &Texture, uv: &Uv, level: I8, same: bool, weight: F8) -> ([I8; 2], 
 /// A channel is decoded by one product, and a level takes half the memory of one in linear light, which matters most: texels
 /// come from far away.
 #[inline(always)]
-fn add_packed(t: &Texture, levels: &[Level<u32>], uv: &Uv, level: I8, weight: F8, sum: &mut [F8; 4]) {
-    let same = level.equal(I8::splat(level.0[0])).all();
+fn add_packed<const N: usize>(
+    t: &Texture,
+    levels: &[Level<u32>],
+    uv: &Uv<N>,
+    level: I<N>,
+    weight: F<N>,
+    sum: &mut [F<N>; 4],
+) {
+    let same = level.equal(I::splat(level.0[0])).all();
     let (at, weights) = around(t, uv, level, same, weight);
-    let (mut whole, mut all) = ([&[][..]; 8], true);
-    for k in 0..if same { 1 } else { 8 } {
+    let (mut whole, mut all) = ([&[][..]; N], true);
+    for k in 0..if same { 1 } else { N } {
         let texels = levels[level.0[k] as usize].whole();
         (whole[k], all) = (texels.unwrap_or_default(), all & texels.is_some());
     }
     for j in 0..2 {
         let [left, right] = match (all, same) {
-            (true, true) => pairs::<true>(&whole, at[j]),
-            (true, false) => pairs::<false>(&whole, at[j]),
+            (true, true) => pairs::<true, N>(&whole, at[j]),
+            (true, false) => pairs::<false, N>(&whole, at[j]),
             _ => pieces(t, levels, level, at[j]),
         };
         add_squares(sum, left, weights[j][0]);
@@ -218,21 +231,27 @@ fn add_packed(t: &Texture, levels: &[Level<u32>], uv: &Uv, level: I8, weight: F8
 
 /// Texels and their right neighbours, of one level if it is the `SAME`.
 #[inline(always)]
-fn pairs<const SAME: bool>(levels: &[&[u32]; 8], at: I8) -> [I8; 2] {
-    let (mut left, mut right) = (I8::ZERO, I8::ZERO);
-    for k in 0..8 {
+fn pairs<const SAME: bool, const N: usize>(levels: &[&[u32]; N], at: I<N>) -> [I<N>; 2] {
+    let mut words = [0u64; N];
+    for k in 0..N {
         let first = at.0[k] as u32 as usize;
         let pair = &levels[if SAME { 0 } else { k }][first..first + 2];
-        (left.0[k], right.0[k]) = (pair[0] as i32, pair[1] as i32);
+        words[k] = u64::from(pair[0]) | u64::from(pair[1]) << 32;
+    }
+    // Through memory: what is taken apart right from single numbers becomes vector instructions in parts only.
+    let words = std::hint::black_box(words);
+    let (mut left, mut right) = (I::ZERO, I::ZERO);
+    for k in 0..N {
+        (left.0[k], right.0[k]) = (words[k] as i32, (words[k] >> 32) as i32);
     }
     [left, right]
 }
 
 /// The same where not all of a level is there.
 #[inline(never)]
-fn pieces(t: &Texture, levels: &[Level<u32>], level: I8, at: I8) -> [I8; 2] {
-    let (mut left, mut right) = (I8::ZERO, I8::ZERO);
-    for k in 0..8 {
+fn pieces<const N: usize>(t: &Texture, levels: &[Level<u32>], level: I<N>, at: I<N>) -> [I<N>; 2] {
+    let (mut left, mut right) = (I::ZERO, I::ZERO);
+    for k in 0..N {
         let number = level.0[k] as usize;
         let pair = levels[number].pair(at.0[k] as u32 as usize, |range| texels::packed(t, number, range));
         (left.0[k], right.0[k]) = (pair[0] as i32, pair[1] as i32);
@@ -241,11 +260,11 @@ fn pieces(t: &Texture, levels: &[Level<u32>], level: I8, at: I8) -> [I8; 2] {
 }
 
 #[inline(always)]
-fn add_squares(sum: &mut [F8; 4], texel: I8, weight: F8) {
-    let low = I8::splat(2047);
+fn add_squares<const N: usize>(sum: &mut [F<N>; 4], texel: I<N>, weight: F<N>) {
+    let low = I::splat(2047);
     let r = (texel & low).to_f32();
     let g = (texel.shift_right(11) & low).to_f32();
-    let b = (texel.shift_right(22) & I8::splat(1023)).to_f32();
+    let b = (texel.shift_right(22) & I::splat(1023)).to_f32();
     sum[0] = sum[0] + r * r * weight;
     sum[1] = sum[1] + g * g * weight;
     sum[2] = sum[2] + b * b * weight;
@@ -255,15 +274,15 @@ fn add_squares(sum: &mut [F8; 4], texel: I8, weight: F8) {
 ///
 /// Each lane takes the two texels of a row in one load, all channels side by side.
 #[inline(always)]
-fn add_wide(t: &Texture, uv: &Uv, level: I8, weight: F8, sum: &mut [F8; 4]) {
+fn add_wide<const N: usize>(t: &Texture, uv: &Uv<N>, level: I<N>, weight: F<N>, sum: &mut [F<N>; 4]) {
     let (at, weights) = around(t, uv, level, false, weight * (1.0 / 65535.0));
-    for k in 0..8 {
+    for k in 0..N {
         let number = level.0[k] as usize;
         let texels = &t.wide()[number];
         let row = |j: usize| texels.pair(at[j].0[k] as usize, |range| texels::wide(t, number, range));
         let (upper, lower) = (row(0), row(1));
         for c in 0..4 {
-            let mean = |row: &[[u16; 4]; 2], w: &[F8; 2]| {
+            let mean = |row: &[[u16; 4]; 2], w: &[F<N>; 2]| {
                 row[0][c] as f32 * w[0].0[k] + row[1][c] as f32 * w[1].0[k]
             };
             sum[c].0[k] += mean(&upper, &weights[0]) + mean(&lower, &weights[1]);

@@ -27,6 +27,9 @@ pub(crate) struct Level<T> {
     whole: OnceLock<Vec<T>>,
 }
 
+/// A level of so few pieces is made at once.
+const FEW: usize = 16;
+
 /// Texels of a piece.
 const PIECE: usize = 1 << 12;
 
@@ -77,17 +80,20 @@ impl<T: Copy> Level<T> {
         let piece = &self.pieces[place / PIECE];
         let texels = match piece.get() {
             Some(texels) => texels,
-            None => {
-                let first = place / PIECE * PIECE;
-                let texels = piece.get_or_init(|| make(first..first + PIECE + 1));
-                if 2 * self.made.fetch_add(1, Ordering::Relaxed) >= self.pieces.len() - 1 {
-                    self.whole.get_or_init(|| make(0..usize::MAX));
-                }
-                texels
-            }
+            None => return self.fresh(place, make),
         };
-        let pair = &texels[place % PIECE..][..2];
-        [pair[0], pair[1]]
+        [texels[place % PIECE], texels[place % PIECE + 1]]
+    }
+
+    fn fresh(&self, place: usize, make: impl Fn(Range<usize>) -> Vec<T>) -> [T; 2] {
+        let pieces = self.pieces.len();
+        if pieces <= FEW || 2 * self.made.fetch_add(1, Ordering::Relaxed) >= pieces {
+            let whole = self.whole.get_or_init(|| make(0..usize::MAX));
+            return [whole[place], whole[place + 1]];
+        }
+        let (piece, at) = (place / PIECE, place % PIECE);
+        let texels = self.pieces[piece].get_or_init(|| make(PIECE * piece..PIECE * (piece + 1) + 1));
+        [texels[at], texels[at + 1]]
     }
 }
 
@@ -181,8 +187,8 @@ mod tests {
 
     #[test]
     fn pieces_hold_what_the_level_does_and_their_neighbours() {
-        // 117 texels a row: pieces end anywhere in one.
-        let (w, h) = (117usize, 113usize);
+        // 618 texels a row: pieces end anywhere in one.
+        let (w, h) = (617usize, 131usize);
         let bytes: Vec<u8> = (0..w * h).flat_map(|i| [i as u8, (i >> 8) as u8, 7, 3]).collect();
         for (wrap, end) in [(WrapMode::Repeat, 0), (WrapMode::Clamp, w - 1)] {
             let t = texture([w as u32, h as u32], bytes.clone(), Content::Numbers, wrap);

@@ -1,8 +1,9 @@
 //! What colour it is.
 
 use super::*;
-use glam::DVec3;
-use sinew::scene::LightKind;
+use glam::{Affine2, DVec3};
+use sinew::scene::{Content, Filter, LightKind, TextureId, TextureRef, WrapMode};
+use std::f32::consts::PI;
 
 fn point(position: Vec3, falloff: Option<f32>) -> Light {
     Light::new(LightKind::Point { position, falloff }, Vec3::ONE)
@@ -252,5 +253,61 @@ fn creases_and_flat_faces_keep_a_colour_for_each_side() {
             row[3] > row[5] + 0.1 && [0.25, 0.5, 0.75].iter().any(|s| (share - s).abs() < 1e-3),
             "{row:?}"
         );
+    }
+}
+
+/// A bumpy sphere of triangles of all sizes, with coordinates.
+fn lump(colors: bool) -> Mesh {
+    let mut data = MeshData::default();
+    for (j, i) in (0..=40).flat_map(|j| (0..=60).map(move |i| (j, i))) {
+        let (theta, phi) = ((j as f32 / 40.0).powi(2) * PI, i as f32 / 30.0 * PI);
+        let d = Vec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
+        data.positions.push(d * (1.0 + 0.1 * (5.0 * d.x + 9.0 * d.y).sin()));
+        data.normals.push(d);
+        data.uvs[0].push(Vec2::new(i as f32 * 0.05 - 1.0, j as f32 * 0.03));
+        data.colors.extend(colors.then_some(Vec4::ONE));
+    }
+    for (j, i) in (0..40).flat_map(|j| (0..60).map(move |i| (j, i))) {
+        let a = j * 61 + i;
+        data.triangles.extend([[a, a + 1, a + 61], [a + 1, a + 62, a + 61]]);
+    }
+    Mesh::new(data).unwrap()
+}
+
+#[test]
+fn clay_has_a_kernel_of_its_own_and_looks_like_everything_else() {
+    let mut rng = Rng::new(11);
+    let bytes =
+        (0..64 * 64).flat_map(|_| [rng.next() as u8, rng.next() as u8, rng.next() as u8, 255]).collect();
+    let texture =
+        Texture::new(64, 64, bytes, Content::Color, [WrapMode::Repeat; 2], Filter::Trilinear).unwrap();
+    let transform = Affine2::from_scale_angle_translation(Vec2::splat(0.7), 0.4, Vec2::splat(0.2));
+    let map = TextureRef { texture: TextureId(0), uv_set: 0, transform };
+    let plain =
+        Material { diffuse: Vec4::new(0.8, 0.5, 0.3, 1.0), specular: Vec3::splat(0.5), ..Default::default() };
+    let ortho = from_front(3.0, 1.4);
+    let close = perspective(Vec3::new(0.3, 0.2, 1.3), Vec3::new(0.2, 0.0, 0.0), 1.2);
+    for (camera, double_sided, diffuse_map) in
+        [ortho, close].iter().flat_map(|&c| [(c, false, None), (c, true, Some(map)), (c, false, Some(map))])
+    {
+        // White at every vertex changes nothing, but leads past that kernel.
+        let stage = |colors: bool| {
+            let m = Material { double_sided, diffuse_map, emissive: Vec3::X * 0.1, ..plain.clone() };
+            let mut stage = Stage::of(camera, lump(colors), m);
+            stage.textures.push(texture.clone());
+            stage.ambient = Vec3::splat(0.1);
+            let lamp = LightKind::Point { position: Vec3::new(2.0, 3.0, 4.0), falloff: Some(20.0) };
+            stage.lights = vec![Light::new(lamp, Vec3::ONE * 20.0)];
+            stage
+        };
+        for samples in [1, 4] {
+            let (own, stats) = stage(false).bytes(300, samples);
+            let (general, same) = stage(true).bytes(300, samples);
+            assert_eq!(stats, same);
+            let off = own.data.iter().zip(&general.data).map(|(a, b)| a.abs_diff(*b));
+            let (mut differ, mut worst) = (0, 0);
+            off.for_each(|d| (differ, worst) = (differ + usize::from(d > 0), worst.max(d)));
+            assert!(worst <= 1 && differ < 360, "{differ} bytes of 360,000 differ, by {worst} at most");
+        }
     }
 }

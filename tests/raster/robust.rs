@@ -30,8 +30,10 @@ fn jumble(seed: u64) -> Stage {
         base.clone(),
         Material { alpha: AlphaMode::Mask(0.4), ..base.clone() },
         Material { alpha: AlphaMode::Blend, ..base },
+        Material { diffuse_map: Some(map), ..Default::default() },
+        Material { double_sided: true, shininess: 7.5, ..Default::default() },
     ];
-    for (k, size) in [2.0, 0.5, 0.1, 0.02].iter().cycle().take(12).enumerate() {
+    for (k, size) in [2.0, 0.5, 0.1, 0.02].iter().cycle().take(20).enumerate() {
         let mut data = MeshData::default();
         for t in 0..60 {
             let center = rng.point(1.2);
@@ -40,7 +42,7 @@ fn jumble(seed: u64) -> Stage {
             data.normals.extend((0..3).map(|_| rng.point(1.0).normalize()));
             data.triangles.push([3 * t, 3 * t + 1, 3 * t + 2]);
         }
-        stage.meshes.push((Mesh::new(data).unwrap(), k % 3));
+        stage.meshes.push((Mesh::new(data).unwrap(), k % 5));
     }
     stage.ambient = Vec3::splat(0.2);
     stage.lights = vec![
@@ -61,7 +63,7 @@ fn threads_builds_and_old_buffers_do_not_show() {
             let stats = Rasterizer::default().draw(&stage.scene(), &settings(1), &mut want);
             assert!(stats.drawn > 400 && stats.clipped > 3, "{stats:?}");
             for threads in [1, 2, 5] {
-                for isa in [Isa::Best, Isa::Portable] {
+                for isa in [Isa::Best, Isa::Avx2, Isa::Portable] {
                     let again =
                         Rasterizer::with_isa(isa).draw(&stage.scene(), &settings(threads), &mut found);
                     assert!(want == found, "{threads} threads, {isa:?}");

@@ -1,7 +1,7 @@
-//! Points of one triangle of clay: a material that is the same all over, with nothing but lamps to light it.
+//! Points of one triangle of clay: lit by nothing but lamps, and of a material that is the same all over but for its colour.
 //!
-//! Most of a picture's work is here or could be, so it has a kernel of its own that asks nothing at every point, and that is as wide as
-//! the machine: sixteen points at once take half the instructions of twice eight.
+//! Most of a picture is made of it, so it has a kernel of its own, which asks nothing at every point that the triangle can answer, and which
+//! is as wide as the machine: sixteen points at once take half the instructions of twice eight.
 
 use super::TILE;
 use super::frame::{Draw, Frame};
@@ -9,9 +9,11 @@ use super::resolve::{self, Shades};
 use super::scan::{self, Key};
 use crate::math::lanes::V3;
 use crate::math::simd::{self, F, I, WideKernel};
+use crate::render::sample::{self, Uv};
 use crate::render::shade::{self, Surface};
 use crate::render::varying;
-use glam::{Vec3, Vec4};
+use crate::scene::{Camera, Projection};
+use glam::{Vec2, Vec3, Vec4};
 
 /// Points to be shaded.
 pub(super) struct Clay<'a> {
@@ -46,52 +48,64 @@ impl WideKernel for Clay<'_> {
         let (scene, m) = (frame.scene, draw.material);
         let edges = Edges::new(known, corner, keys[0]);
         let t = draw.object.mesh.triangles[id as usize];
-        let positions = Attribute::new(draw.object.positions, t);
-        let normals = Attribute::new(draw.object.normals, t);
-        let k_d = m.diffuse.truncate();
-        let still = m.emissive + m.ambient.unwrap_or(k_d) * scene.ambient;
+        let positions = Attribute(corners(draw.object.positions, t));
+        let normals = Attribute(side(draw, &scene.camera, &positions.0, corners(draw.object.normals, t)));
+        let skin = draw.skin.map(|(texture, map)| {
+            let uvs = corners(&draw.object.mesh.uvs[(map.uv_set & 1) as usize], t);
+            (texture, uvs.map(|uv| map.transform.transform_point2(uv)))
+        });
         let [red, green, blue, alpha] = &mut out.0;
-        let rgb = red
-            .as_chunks_mut::<N>()
-            .0
-            .iter_mut()
-            .zip(green.as_chunks_mut::<N>().0)
-            .zip(blue.as_chunks_mut::<N>().0);
-        let out = rgb.zip(alpha.as_chunks_mut::<N>().0);
-        for (keys, (((red, green), blue), alpha)) in keys.as_chunks::<N>().0[..n.div_ceil(N)].iter().zip(out)
+        let rg = red.as_chunks_mut::<N>().0.iter_mut().zip(green.as_chunks_mut::<N>().0);
+        let ba = blue.as_chunks_mut::<N>().0.iter_mut().zip(alpha.as_chunks_mut::<N>().0);
+        for ((keys, (red, green)), (blue, alpha)) in
+            keys.as_chunks::<N>().0[..n.div_ceil(N)].iter().zip(rg).zip(ba)
         {
-            let b = edges.at(&I(*keys));
+            let (b, scale) = edges.at(&I(*keys));
             let position = positions.at(&b);
+            let mut k_d = V3::splat(m.diffuse.truncate());
+            if let Some((texture, uvs)) = &skin {
+                let [r, g, b, _] = sample::sample(frame.isa, texture, &edges.uv(uvs, &b, scale));
+                k_d = k_d * V3::new(r, g, b);
+            }
             let s = Surface {
                 position,
                 normal: normals.at(&b).unit(),
                 view: varying::view(&scene.camera, position),
-                ambient: V3::ZERO,
-                diffuse: V3::splat(k_d),
+                ambient: m.ambient.map_or(k_d, V3::splat),
+                diffuse: k_d,
                 specular: V3::splat(m.specular),
                 shininess: F::splat(m.shininess),
                 openness: F::ONE,
-                emissive: V3::ZERO,
+                emissive: V3::splat(m.emissive),
             };
-            let mut light = V3::splat(still);
-            for lamp in &frame.lamps {
-                let a = shade::arrival(lamp, s.position);
-                light = light + a.intensity * shade::reflected(&s, a.towards, true);
-            }
+            let light = shade::shadowed(&s, V3::splat(scene.ambient), &frame.lamps, &[], true);
             (*red, *green, *blue, *alpha) = (light.x.0, light.y.0, light.z.0, [1.0; N]);
         }
     }
 }
 
 /// What a triangle's corners have.
+#[inline(always)]
+fn corners<T: Copy>(list: &[T], t: [u32; 3]) -> [T; 3] {
+    [list[t[0] as usize], list[t[1] as usize], list[t[2] as usize]]
+}
+
+/// Normals on the eye's side, if the material has two: the eye sees one side of a whole triangle.
+#[inline(always)]
+fn side(draw: &Draw, camera: &Camera, p: &[Vec3; 3], n: [Vec3; 3]) -> [Vec3; 3] {
+    let face = (p[1] - p[0]).cross(p[2] - p[0]);
+    let view = match camera.projection {
+        Projection::Perspective { .. } => camera.eye() - p[0],
+        Projection::Orthographic { .. } => camera.scene_from_view.matrix3.z_axis.into(),
+    };
+    let away = (face.dot(view) < 0.0) != draw.object.mirrored;
+    if draw.material.double_sided && away { [-n[0], -n[1], -n[2]] } else { n }
+}
+
+/// What is mixed between corners.
 struct Attribute([Vec3; 3]);
 
 impl Attribute {
-    #[inline(always)]
-    fn new(list: &[Vec3], t: [u32; 3]) -> Self {
-        Self([list[t[0] as usize], list[t[1] as usize], list[t[2] as usize]])
-    }
-
     #[inline(always)]
     fn at<const N: usize>(&self, b: &[F<N>; 3]) -> V3<F<N>> {
         let v = &self.0;
@@ -121,16 +135,31 @@ impl Edges {
         Self { e: [turned(e0), turned(e1), turned(e2)], pixel }
     }
 
-    /// Barycentric coordinates; points just outside are pulled in.
+    /// Barycentric coordinates, and `1 / Σ eᵢ`; points just outside are pulled in.
     #[inline(always)]
-    fn at<const N: usize>(&self, keys: &I<N>) -> [F<N>; 3] {
+    fn at<const N: usize>(&self, keys: &I<N>) -> ([F<N>; 3], F<N>) {
         let [x, y] = resolve::points([-self.pixel[0], -self.pixel[1]], keys);
         let e = &self.e;
         let e0 = (x * e[0][1] + y * e[0][2] + e[0][0]).max(F::ZERO);
         let e1 = (x * e[1][1] + y * e[1][2] + e[1][0]).max(F::ZERO);
         let e2 = (x * e[2][1] + y * e[2][2] + e[2][0]).max(F::ZERO);
-        let norm = F::ONE / (e0 + e1 + e2).max(F::splat(1e-30));
-        [e0 * norm, e1 * norm, e2 * norm]
+        let scale = F::ONE / (e0 + e1 + e2).max(F::splat(1e-30));
+        ([e0 * scale, e1 * scale, e2 * scale], scale)
+    }
+
+    /// Texture coordinates, and their slopes: `∂u = (Σ ∂eᵢ uᵢ − u Σ ∂eᵢ) / Σ eᵢ`.
+    #[inline(always)]
+    fn uv<const N: usize>(&self, at: &[Vec2; 3], b: &[F<N>; 3], scale: F<N>) -> Uv<N> {
+        let mix = |u: [f32; 3]| b[0] * u[0] + b[1] * u[1] + b[2] * u[2];
+        let [us, vs] = [[at[0].x, at[1].x, at[2].x], [at[0].y, at[1].y, at[2].y]];
+        let (u, v) = (mix(us), mix(vs));
+        let slope = |along: usize, us: [f32; 3], u: F<N>| {
+            let d = [self.e[0][along], self.e[1][along], self.e[2][along]];
+            // From one of the corners, so that coordinates far from zero lose nothing.
+            let sum = d[1] * (us[1] - us[0]) + d[2] * (us[2] - us[0]);
+            (F::splat(sum) - (u + -us[0]) * (d[0] + d[1] + d[2])) * scale
+        };
+        Uv { u, v, right: [slope(1, us, u), slope(1, vs, v)], down: [slope(2, us, u), slope(2, vs, v)] }
     }
 }
 

@@ -308,7 +308,8 @@ impl Walk {
                     let z = self.z + (self.z_x * x + z_y);
                     visitor.see(at, !out, z.max(lo).min(hi));
                     met = true;
-                } else if met {
+                } else if met && samples == 1 {
+                    // Of one sample a pixel, those of a row that lie within follow each other.
                     break;
                 }
                 (f0, f1, f2) = (f0 + across0, f1 + across1, f2 + across2);

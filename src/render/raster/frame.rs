@@ -4,7 +4,7 @@ use super::Stats;
 use crate::math::simd::{F8, Isa, V8};
 use crate::render::Settings;
 use crate::render::shade::Lamp;
-use crate::scene::{AlphaMode, Material, Object, Projection, Scene};
+use crate::scene::{AlphaMode, Material, Object, Projection, Scene, Texture, TextureRef};
 use glam::{Vec3, Vec4};
 
 pub(super) use crate::render::ROTATED;
@@ -31,8 +31,10 @@ pub(super) struct Draw<'a> {
     pub cull: bool,
     /// What shading reads is continuous where triangles share a vertex.
     pub continuous: bool,
-    /// Its material is the same all over, and only lamps light it.
+    /// Nothing but lamps lights it, and nothing but its colour differs from point to point.
     pub clay: bool,
+    /// The picture of that colour, and the transform of its coordinates.
+    pub skin: Option<(&'a Texture, &'a TextureRef)>,
 }
 
 /// Rows of `picture_from_scene`: homogeneous pixels relative to the picture's centre, y down, and depth.
@@ -114,6 +116,9 @@ impl<'a> Frame<'a> {
             return;
         }
         let material = self.scene.materials.get(object.material).unwrap_or(&FALLBACK);
+        let skin = material.diffuse_map.as_ref();
+        let skin = skin.and_then(|m| Some((self.scene.textures.get(m.texture.0 as usize)?, m)));
+        let uvs = |m: &TextureRef| &object.mesh.uvs[(m.uv_set & 1) as usize];
         self.draws.push(Draw {
             object,
             material,
@@ -129,11 +134,10 @@ impl<'a> Frame<'a> {
             continuous: material.unlit || !object.normals.is_empty(),
             clay: !object.normals.is_empty()
                 && object.mesh.colors.is_empty()
-                && crate::render::material::maps(material).next().is_none()
-                && !material.unlit
-                && !material.double_sided
-                && material.alpha != AlphaMode::Blend
+                && skin.is_none_or(|(_, m)| !uvs(m).is_empty())
+                && is_simple(material)
                 && self.scene.style.is_plain(),
+            skin,
         });
         self.triangle_count = end as u32;
         self.vertex_count += v;
@@ -153,6 +157,12 @@ impl<'a> Frame<'a> {
             Projection::Orthographic { .. } => c.near + (1.0 - z) * (c.far - c.near).max(f32::MIN_POSITIVE),
         }
     }
+}
+
+/// Lit, not seen through, and with no map but one of its colour.
+fn is_simple(m: &Material) -> bool {
+    let maps = [&m.specular_map, &m.emissive_map, &m.normal_map, &m.occlusion_map];
+    maps.iter().all(|m| m.is_none()) && !m.unlit && m.alpha != AlphaMode::Blend
 }
 
 impl Projector {

@@ -112,11 +112,12 @@ fn chain(frame: &Frame, area: Area, k: usize, scratch: &mut TileScratch) {
         let corner = area.corner(frame);
         while chain.count - done >= GROUP {
             let at = (chain.first + done) as usize;
-            let n = (chain.count - done).min(8 * BATCHES as u32);
-            let n = if n % 8 >= GROUP { n } else { n & !7 } as usize;
+            let left = (chain.count - done) as usize;
+            let n = left.min(8 * BATCHES);
+            let n = if n % 8 >= GROUP as usize { n } else { n & !7 };
             // There is room beyond the chain's end for lanes that repeat the first.
             let keys = &mut entries.keys[at..at + n.next_multiple_of(ROOM)];
-            for k in n..keys.len() {
+            for k in left..keys.len() {
                 keys[k] = keys[0];
             }
             if draw.clay {
@@ -142,7 +143,7 @@ fn chain(frame: &Frame, area: Area, k: usize, scratch: &mut TileScratch) {
 pub(super) fn points<const N: usize>(corner: [f32; 2], keys: &I<N>) -> [F<N>; 2] {
     let px = (*keys & I::splat(TILE as i32 - 1)).to_f32() + corner[0];
     let py = (keys.shift_right(6) & I::splat(TILE as i32 - 1)).to_f32() + corner[1];
-    if !I::splat(WHOLE as i32).gt(keys.shift_right(12)).any() {
+    if keys.shift_right(12).equal(I::splat(WHOLE as i32)).all() {
         return [px, py];
     }
     let (mut cx, mut cy) = (F::ZERO, F::ZERO);
