@@ -1,6 +1,7 @@
 //! Vectors and numbers of several kinds, for what is written once: `f32` and `f64`, one or eight at a time.
 
-use super::simd::{self, D8, F, F8, I};
+use super::power;
+use super::simd::{D8, F, F8, I};
 use std::fmt::Debug;
 use std::ops::{Add, BitOr, Div, Mul, Neg, Sub};
 
@@ -160,7 +161,7 @@ macro_rules! wide {
     };
 }
 
-wide!([<const N: usize>] F<N>, N, f32, simd::pow);
+wide!([<const N: usize>] F<N>, N, f32, power::pow);
 wide!([] D8, 8, f64, D8::powf);
 
 /// A point, direction or colour.

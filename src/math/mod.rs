@@ -2,6 +2,7 @@
 
 pub mod euler;
 pub mod lanes;
+pub mod power;
 pub mod rotation;
 pub mod simd;
 pub mod spline;

@@ -3,7 +3,8 @@
 use super::sample::{self, Uv};
 use super::shade::{self, Surface};
 use super::styled;
-use crate::math::simd::{self, F8, I8, Isa, V8};
+use crate::math::power;
+use crate::math::simd::{F8, I8, Isa, V8};
 use crate::scene::{AlphaMode, Material, Scene, TextureRef};
 use glam::Affine2;
 
@@ -183,7 +184,7 @@ fn lit<const ANY: bool>(maps: &Maps<ANY>, m: &Material, p: &impl Points, k_d: V8
 fn highlight<const ANY: bool>(maps: &Maps<ANY>, m: &Material) -> (V8, F8) {
     let (k_s, shininess) = (V8::splat(m.specular), F8::splat(m.shininess));
     match maps.texel(&m.specular_map) {
-        Some(t) => (k_s * V8 { x: t[0], y: t[1], z: t[2] }, simd::pow(shininess, t[3])),
+        Some(t) => (k_s * V8 { x: t[0], y: t[1], z: t[2] }, power::pow(shininess, t[3])),
         None => (k_s, shininess),
     }
 }

@@ -1,6 +1,7 @@
 //! Textures at eight points: wrapping, mip levels, filtering (notes §5.12).
 
 use crate::image::color::LINEAR_OF_SRGB8;
+use crate::math::power;
 use crate::math::simd::{self, F, I, Isa, Kernel};
 use crate::scene::texels::{self, Level, PACKED};
 use crate::scene::{Filter, Texture, WrapMode};
@@ -82,7 +83,7 @@ fn lod<const N: usize>(t: &Texture, uv: &Uv<N>) -> F<N> {
         x * x + y * y
     };
     let footprint = square(uv.right).max(square(uv.down));
-    simd::log2(footprint.max(F::splat(1e-12)).min(F::splat(1e12))) * 0.5
+    power::log2(footprint.max(F::splat(1e-12)).min(F::splat(1e12))) * 0.5
 }
 
 /// Sizes of each lane's level along one side.

@@ -3,6 +3,7 @@
 //! A kernel of its own, called and not inlined, so that plain scenes pay one branch for eight points.
 
 use super::shade::{self, Surface};
+use crate::math::power;
 use crate::math::simd::{self, F8, Isa, Kernel, V8};
 use crate::scene::{Light, Scene, ShadowMap};
 use glam::Vec3;
@@ -69,7 +70,7 @@ fn toon(s: &Surface<F8>, scene: &Scene, reached: &[V8], steps: u32) -> V8 {
             continue;
         }
         let n_h = s.normal.dot((s.view + a.towards).unit()).max(F8::ZERO).min(F8::ONE);
-        let bright = simd::pow(n_h, s.shininess).gt(F8::splat(0.5)) & n_l.y.gt(F8::ZERO);
+        let bright = power::pow(n_h, s.shininess).gt(F8::splat(0.5)) & n_l.y.gt(F8::ZERO);
         highlight = V8::select(bright, a.intensity * s.specular, V8::ZERO);
     }
     let key = brightest(&scene.lights);

@@ -14,7 +14,7 @@
 //!
 //! What else makes it fast, measured on that figure: samples of a pixel side by side, only touched 8×8 blocks cleared and read,
 //! pixels listed by triangle through the whole tile, and colours encoded as they are shaded took 26 % off; texels decoded once,
-//! four bytes each and two in one load (`sample`), another 15 %. What did not: AVX-512, as the kernels are eight lanes wide.
+//! four bytes each and two in one load (`sample`), another 15 %.
 //!
 //! The processor does nearly four instructions a cycle here, so that their number is what counts (`valgrind --tool=callgrind` gives
 //! it to the last one). Most of what went since were numbers looked up one by one and computed with at once, which the
