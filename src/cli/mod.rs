@@ -6,6 +6,8 @@ mod compare;
 mod eval;
 mod info;
 mod manifest;
+#[cfg(target_os = "linux")]
+mod memory;
 mod render;
 mod say;
 

@@ -1,7 +1,6 @@
 //! Which points a framing must hold: all vertices, over the whole clip.
 
 use super::framing::Framing;
-use super::ordered::in_order;
 use super::worker::Worker;
 use crate::asset::Asset;
 use crate::skeleton::BoneId;
@@ -27,15 +26,32 @@ impl Span<'_> {
     }
 }
 
-/// Corners of a box that holds all that [`each_moment`] shows; not finite where that is nothing.
-pub(super) fn bounds(span: &Span, anchor: Option<(BoneId, DVec3)>, worker: &mut Worker) -> [Vec3; 2] {
-    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    each_moment(span, anchor, worker, |points| {
+/// What is left of all points that were shown, whoever looked at which.
+pub(super) trait Sight: Clone + Send + Sync {
+    /// Take points in.
+    fn see(&mut self, points: &[Vec3]);
+    /// Take in what was seen of later moments.
+    fn join(&mut self, later: &Self);
+}
+
+/// Corners of a box; what is not finite is passed over.
+impl Sight for [Vec3; 2] {
+    fn see(&mut self, points: &[Vec3]) {
+        let [mut low, mut high] = *self;
         for p in points.iter().filter(|p| p.is_finite()) {
             (low, high) = (low.min(*p), high.max(*p));
         }
-    });
-    [low, high]
+        *self = [low, high];
+    }
+
+    fn join(&mut self, later: &Self) {
+        *self = [self[0].min(later[0]), self[1].max(later[1])];
+    }
+}
+
+/// Corners of a box that holds all that [`each_moment`] shows; not finite where that is nothing.
+pub(super) fn bounds(span: &Span, anchor: Option<(BoneId, DVec3)>, worker: &mut Worker) -> [Vec3; 2] {
+    each_moment(span, anchor, worker, [Vec3::INFINITY, Vec3::NEG_INFINITY])
 }
 
 /// A moment each 24th of a second of the clip, both ends included, and the vertices of one; long clips of large meshes are looked at
@@ -51,34 +67,65 @@ pub(super) fn times(span: &Span) -> (Vec<f64>, usize) {
 }
 
 /// Vertices of all moments from which on several threads are worth their start.
-const PARALLEL: usize = 1 << 20;
+const PARALLEL: usize = 1 << 17;
 
-/// Show `see` the vertices of every mesh at moments of the whole clip, as seen by a camera that follows `anchor`: a bone,
-/// and where it stands in the world when the camera does not move.
+/// Show the vertices of every mesh at moments of the whole clip, as seen by a camera that follows `anchor`: a bone, and where it
+/// stands in the world when the camera does not move. `nothing` is what was seen before.
 ///
 /// Where there is no triangle, the bones' ends stand for the meshes; where there is no bone either, the shapes do.
-pub(super) fn each_moment(
+pub(super) fn each_moment<S: Sight>(
     span: &Span,
     anchor: Option<(BoneId, DVec3)>,
     worker: &mut Worker,
-    mut see: impl FnMut(&[Vec3]),
+    nothing: S,
+) -> S {
+    let (times, vertices) = times(span);
+    let threads = match times.len() * vertices {
+        0..PARALLEL => 1,
+        _ => std::thread::available_parallelism().map_or(1, |n| n.get().min(8)),
+    };
+    let look = |worker: &mut Worker, times: &[f64]| {
+        let mut seen = nothing.clone();
+        look(span, anchor, worker, times, &mut seen);
+        seen
+    };
+    // Each looks at moments that follow each other, the first at its own on this thread.
+    let mut shares = times.chunks(times.len().div_ceil(threads));
+    let own = shares.next().unwrap_or(&[]);
+    std::thread::scope(|scope| {
+        let look = &look;
+        let others: Vec<_> =
+            shares.map(|share| scope.spawn(move || look(&mut Worker::default(), share))).collect();
+        let mut seen = look(worker, own);
+        for other in others {
+            seen.join(&other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+        }
+        seen
+    })
+}
+
+/// Show what there is at some moments.
+fn look(
+    span: &Span,
+    anchor: Option<(BoneId, DVec3)>,
+    worker: &mut Worker,
+    times: &[f64],
+    seen: &mut impl Sight,
 ) {
     let character = &span.asset.character;
-    let solid = |i: usize| !character.mesh(&character.instances()[i]).triangles.is_empty();
-    let instances: Vec<usize> = (0..character.instances().len()).filter(|&i| solid(i)).collect();
-
-    let (times, vertices) = times(span);
-    let moments = times.len();
-    let look = |worker: &mut Worker, k: usize, see: &mut dyn FnMut(&[Vec3])| {
-        worker.evaluate(span.asset, span.clip, times[k]);
-        let Worker { pose, posed, scratch, .. } = worker;
+    let solid = |i: &usize| !character.mesh(&character.instances()[*i]).triangles.is_empty();
+    let instances: Vec<usize> = (0..character.instances().len()).filter(solid).collect();
+    let mut points = Vec::new();
+    for &time in times {
+        worker.evaluate(span.asset, span.clip, time);
+        let Worker { pose, posed, scratch, .. } = &mut *worker;
         let center = span.center + anchor.map_or(DVec3::ZERO, |(bone, at)| posed.origin(bone) - at);
-        let mut points = Vec::new();
         for &i in &instances {
             character.positions(i, pose, posed, center, scratch, &mut points);
-            see(&points);
+            seen.see(&points);
         }
         if instances.is_empty() {
+            points.clear();
             let skeleton = character.skeleton();
             for bone in skeleton.ids() {
                 let m = posed.near(bone, center);
@@ -88,21 +135,7 @@ pub(super) fn each_moment(
                 let end = |corner: usize, axis: usize| ends[corner >> axis & 1][axis];
                 points.extend((0..8).map(|k| Vec3::new(end(k, 0), end(k, 1), end(k, 2))));
             }
-            see(&points);
+            seen.see(&points);
         }
-    };
-    if moments * vertices < PARALLEL {
-        return (0..moments).for_each(|k| look(worker, k, &mut see));
     }
-    let threads = std::thread::available_parallelism().map_or(1, |n| n.get().min(8));
-    let gather = |worker: &mut Worker, k: usize| {
-        let mut all = Vec::with_capacity(vertices);
-        look(worker, k, &mut |points| all.extend_from_slice(points));
-        all
-    };
-    let seen = in_order(moments, threads, Worker::default, gather, |_, points| {
-        see(&points);
-        Ok(())
-    });
-    debug_assert!(seen.is_ok(), "nobody stops it");
 }

@@ -1,5 +1,6 @@
 //! The nearest eye that sees all it must.
 
+use super::fit::Sight;
 use crate::scene::{Camera, Projection};
 use glam::{Affine3A, Mat3A, Vec3, Vec3A, Vec4};
 use std::f32::consts::TAU;
@@ -197,6 +198,17 @@ impl Framing {
             some.include(&[Vec3::splat(-0.5), Vec3::splat(0.5)]);
         }
         some
+    }
+}
+
+impl Sight for Framing {
+    fn see(&mut self, points: &[Vec3]) {
+        self.include(points);
+    }
+
+    fn join(&mut self, later: &Self) {
+        self.edges = Vec4::from(later.edges).max(self.edges.into()).into();
+        (self.low, self.high) = (later.low.min(self.low), later.high.max(self.high));
     }
 }
 

@@ -50,9 +50,8 @@ impl<'a> Stand<'a> {
         let axis = axis(span, view, &framing, worker);
         let local = |p: DVec3| (p - center).as_vec3();
         let mut fitted = |axes: Mat3A, fov_y: f32| {
-            let mut f = Framing::along(axes, fov_y, aspect, framing.fill()).turning(framing.turns, axis);
-            fit::each_moment(span, anchor, worker, |points| f.include(points));
-            f
+            let f = Framing::along(axes, fov_y, aspect, framing.fill()).turning(framing.turns, axis);
+            fit::each_moment(span, anchor, worker, f)
         };
         let base = match *view {
             View::Orbit { yaw, pitch, fov_y } => {

@@ -7,9 +7,9 @@ use glam::{Affine3A, Mat3A, Vec3, Vec3A};
 /// `V` vertices, each blended from `weights.per_vertex()` matrices of the palette.
 pub(super) fn deform(rest: Rest, weights: &Weights, palette: &[Affine3A], out: &mut Deformed) {
     let mut inside_out = 0;
-    for (i, p) in rest.positions.iter().enumerate() {
+    for (i, (p, influences)) in rest.positions.iter().zip(weights.rows()).enumerate() {
         // Blend the matrices, then apply one: the same sum as blending the results.
-        let m = blend(weights.of(i), palette);
+        let m = blend(influences, palette);
         out.positions[i] = m.transform_point3(*p);
 
         let det = m.matrix3.determinant();
@@ -27,23 +27,21 @@ pub(super) fn deform(rest: Rest, weights: &Weights, palette: &[Affine3A], out: &
 
 /// Positions alone.
 pub(super) fn positions(rest: &[Vec3], weights: &Weights, palette: &[Affine3A], out: &mut Vec<Vec3>) {
-    let moved = |(i, p): (usize, &Vec3)| blend(weights.of(i), palette).transform_point3(*p);
-    out.extend(rest.iter().enumerate().map(moved));
+    let moved = |(p, influences): (&Vec3, _)| blend(influences, palette).transform_point3(*p);
+    out.extend(rest.iter().zip(weights.rows()).map(moved));
 }
 
+/// The strongest influence comes first: alone it needs no sum, and after one of nothing there is no other.
 #[inline]
-fn blend(influences: impl Iterator<Item = (usize, f32)>, palette: &[Affine3A]) -> Affine3A {
+fn blend((bones, weights): (&[u16], &[f32]), palette: &[Affine3A]) -> Affine3A {
+    if weights[0] == 1.0 {
+        return palette[usize::from(bones[0])];
+    }
     let mut sum = Affine3A { matrix3: Mat3A::ZERO, translation: Vec3A::ZERO };
-    for (bone, w) in influences {
-        if w == 0.0 {
-            continue;
-        }
-        let t = &palette[bone];
-        if w == 1.0 {
-            return *t;
-        }
-        sum.matrix3 += t.matrix3 * w;
-        sum.translation += t.translation * w;
+    for (bone, w) in bones.iter().zip(weights).take_while(|(_, w)| **w != 0.0) {
+        let t = &palette[usize::from(*bone)];
+        sum.matrix3 += t.matrix3 * *w;
+        sum.translation += t.translation * *w;
     }
     sum
 }

@@ -157,6 +157,12 @@ impl Weights {
         let r = vertex * self.per_vertex..(vertex + 1) * self.per_vertex;
         self.bones[r.clone()].iter().zip(&self.weights[r]).map(|(&b, &w)| (b as usize, w))
     }
+
+    /// Palette indices and weights of all vertices, one after the other, strongest first.
+    #[inline]
+    pub(super) fn rows(&self) -> impl ExactSizeIterator<Item = (&[u16], &[f32])> {
+        self.bones.chunks_exact(self.per_vertex.max(1)).zip(self.weights.chunks_exact(self.per_vertex.max(1)))
+    }
 }
 
 fn repair(row: &mut Vec<(u16, f32)>, fallback: u16, report: &mut WeightsReport) {

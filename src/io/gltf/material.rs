@@ -4,7 +4,8 @@ use super::bake::Workflow;
 use super::document::Document;
 use super::error::Result;
 use super::geometry::Geometry;
-use super::textures::{Slot, Textures};
+use super::pictures::Ahead;
+use super::textures::{self, Slot, Textures};
 use super::warnings::Warnings;
 use crate::io::Options;
 use crate::scene::{AlphaMode, Content, Material, Texture};
@@ -25,10 +26,11 @@ pub(super) fn build(
     base: Option<&Path>,
     options: &Options,
     geometry: &Geometry,
+    ahead: Option<Ahead>,
     w: &mut Warnings,
 ) -> Result<Looks> {
     let drawn = geometry.drawn.iter().filter_map(|&i| doc.root.materials.get(i));
-    let mut textures = Textures::load(doc, base, drawn.flat_map(slots), options, w);
+    let mut textures = Textures::load(doc, base, drawn.flat_map(slots), options, ahead, w);
     let mut materials = Vec::with_capacity(doc.root.materials.len() + 1);
     for (i, m) in doc.root.materials.iter().enumerate() {
         let name = m.name.clone().unwrap_or_else(|| format!("material_{i}"));
@@ -39,6 +41,13 @@ pub(super) fn build(
         materials.push(one(&json::Material::default(), "default".into(), &mut textures, w));
     }
     Ok(Looks { materials, textures: textures.finish() })
+}
+
+/// The first image that the first mesh with maps asks for: whether it is drawn is for its triangles to say.
+pub(super) fn first_image(doc: &Document) -> Option<usize> {
+    let primitives = doc.root.meshes.iter().flat_map(|m| &m.primitives);
+    let materials = primitives.filter_map(|p| doc.root.materials.get(p.material?.value()));
+    materials.flat_map(slots).find_map(|slot| textures::source(doc, slot.texture))
 }
 
 /// Every reference to a texture that is looked at.

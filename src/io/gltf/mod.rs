@@ -88,14 +88,24 @@ pub fn import_bytes(
     let root = mend::root(parts.json, &mut w)?;
     extensions::check(&root, &mut w)?;
     let doc = Document::new(root, parts.bin, base_dir, &mut w)?;
-    assemble(&doc, base_dir, options, w)
+    std::thread::scope(|scope| {
+        let first = options.textures.then(|| material::first_image(&doc)).flatten();
+        let ahead = first.and_then(|image| pictures::Ahead::begin(scope, &doc, image));
+        assemble(&doc, base_dir, options, ahead, w)
+    })
 }
 
-fn assemble(doc: &Document, base: Option<&Path>, options: &Options, mut w: Warnings) -> Result<Import> {
+fn assemble(
+    doc: &Document,
+    base: Option<&Path>,
+    options: &Options,
+    ahead: Option<pictures::Ahead>,
+    mut w: Warnings,
+) -> Result<Import> {
     let nodes = nodes::build(doc, &clips::animated(doc), &mut w)?;
     let geometry = geometry::build(doc, &nodes, &mut w)?;
     let clips = clips::build(doc, &nodes, &geometry.runs, &mut w)?;
-    let looks = material::build(doc, base, options, &geometry, &mut w)?;
+    let looks = material::build(doc, base, options, &geometry, ahead, &mut w)?;
     let character =
         Character::new(nodes.skeleton, geometry.meshes, geometry.instances, geometry.rest_weights, clips)?;
     let cameras = mounts::cameras(doc, &nodes.in_scene, &nodes.bone_of, &mut w)?;

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread::{Scope, ScopedJoinHandle};
 
 /// Longest side that is decoded, pixels.
 const SIDE: u32 = 1 << 14;
@@ -73,8 +74,35 @@ struct Budget {
 
 type Job<'a> = Result<Cow<'a, [u8]>, String>;
 
+/// Undecoded bytes from which on a picture takes longer than a thread to start.
+const LONG: usize = 1 << 16;
+
+/// A picture that is decoded while the rest of the file is read: what most often takes longer than all else, so that it should not wait
+/// for what the file's triangles say of it.
+pub(super) struct Ahead<'s> {
+    view: usize,
+    picture: ScopedJoinHandle<'s, Result<Picture, String>>,
+}
+
+impl<'s> Ahead<'s> {
+    /// Begin with an image, if its bytes are in the file as they are and it is neither small nor larger than a file of no size allows.
+    pub fn begin<'d: 's>(scope: &'s Scope<'s, 'd>, doc: &'d Document, image: usize) -> Option<Self> {
+        let view = doc.root.images.get(image).filter(|i| i.uri.is_none())?.buffer_view?.value();
+        let bytes = doc.plain(view).filter(|b| b.len() >= LONG)?;
+        let mut budget = Budget { encoded: 0, pixels: PIXEL_BYTES, buffers: 0, allowed: 0 };
+        budget.admit(Cow::Borrowed(bytes)).ok()?;
+        Some(Self { view, picture: scope.spawn(move || decode(bytes)) })
+    }
+}
+
 /// Decode the pictures that `wanted` names. What cannot be read is plain white and a warning.
-pub(super) fn load(doc: &Document, base: Option<&Path>, wanted: &[bool], w: &mut Warnings) -> Pictures {
+pub(super) fn load(
+    doc: &Document,
+    base: Option<&Path>,
+    wanted: &[bool],
+    ahead: Option<Ahead>,
+    w: &mut Warnings,
+) -> Pictures {
     // Read the bytes and check the sizes in order, so that the outcome does not depend on threads.
     let mut budget = Budget { encoded: ENCODED_BYTES, pixels: PIXEL_BYTES, buffers: doc.bytes(), allowed: 0 };
     let mut known = BTreeMap::new();
@@ -99,8 +127,10 @@ pub(super) fn load(doc: &Document, base: Option<&Path>, wanted: &[bool], w: &mut
     }
 
     // Decode; each worker takes the next picture that is left.
+    let begun = ahead.and_then(|a| Some((*known.get(&Key::View(a.view))?, a.picture)));
+    let begun = begun.filter(|b| jobs[b.0].is_ok());
     let mut list = Vec::with_capacity(jobs.len());
-    for (i, (decoded, job)) in images.into_iter().zip(decode_all(&jobs).into_iter().zip(&jobs)) {
+    for (i, (decoded, job)) in images.into_iter().zip(decode_all(&jobs, begun).into_iter().zip(&jobs)) {
         let refused = || Err(job.as_ref().err().cloned().unwrap_or_default());
         list.push(decoded.unwrap_or_else(refused).unwrap_or_else(|why| {
             w.push(format!("images[{i}]"), format!("{why}; plain white is used"));
@@ -177,19 +207,24 @@ fn limit() -> String {
 
 type Decoded = Option<Result<Picture, String>>;
 
-fn decode_all(jobs: &[Job]) -> Vec<Decoded> {
+/// Decode all jobs, of which one may have `begun`.
+fn decode_all(
+    jobs: &[Job],
+    begun: Option<(usize, ScopedJoinHandle<Result<Picture, String>>)>,
+) -> Vec<Decoded> {
+    let is_begun = |i: usize| begun.as_ref().is_some_and(|b| b.0 == i);
     let slots: Vec<Mutex<Decoded>> = jobs.iter().map(|_| Mutex::new(None)).collect();
     let next = AtomicUsize::new(0);
     let work = || {
         loop {
             let i = next.fetch_add(1, Ordering::Relaxed);
             let Some(job) = jobs.get(i) else { return };
-            if let (Ok(bytes), Ok(mut slot)) = (job, slots[i].lock()) {
+            if let (Ok(bytes), Ok(mut slot), false) = (job, slots[i].lock(), is_begun(i)) {
                 *slot = Some(decode(bytes));
             }
         }
     };
-    let count = jobs.iter().flatten().count();
+    let count = jobs.iter().flatten().count() - usize::from(begun.is_some());
     // Asking for the processors costs as much as decoding an icon.
     let threads =
         if count > 1 { std::thread::available_parallelism().map_or(1, |n| n.get()).min(count) } else { 1 };
@@ -197,7 +232,11 @@ fn decode_all(jobs: &[Job]) -> Vec<Decoded> {
         (1..threads).for_each(|_| drop(s.spawn(work)));
         work();
     });
-    slots.into_iter().map(|s| s.into_inner().unwrap_or(None)).collect()
+    let mut all: Vec<Decoded> = slots.into_iter().map(|s| s.into_inner().unwrap_or(None)).collect();
+    if let Some((i, picture)) = begun {
+        all[i] = Some(picture.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+    }
+    all
 }
 
 #[cfg(feature = "pictures")]

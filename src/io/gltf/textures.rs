@@ -2,7 +2,7 @@
 
 use super::bake::{self, Grid, Size, Workflow};
 use super::document::Document;
-use super::pictures::{self, Pictures, with_mips};
+use super::pictures::{self, Ahead, Pictures, with_mips};
 use super::warnings::Warnings;
 use crate::io::Options;
 use crate::scene::{Content, Filter, Texture, TextureId, TextureRef, WrapMode};
@@ -91,6 +91,7 @@ impl<'a> Textures<'a> {
         base: Option<&Path>,
         slots: impl Iterator<Item = Slot>,
         options: &Options,
+        ahead: Option<Ahead>,
         w: &mut Warnings,
     ) -> Self {
         let mut wanted = vec![false; doc.root.images.len()];
@@ -105,7 +106,7 @@ impl<'a> Textures<'a> {
                 }
             }
         }
-        let pictures = pictures::load(doc, base, &wanted, w);
+        let pictures = pictures::load(doc, base, &wanted, ahead, w);
         let holder = vec![None; pictures.list.len()];
         let (made, plain, baked) = Default::default();
         let left = pictures.allowance;
@@ -239,7 +240,7 @@ impl<'a> Textures<'a> {
 }
 
 /// The picture of a texture: WebP where the file offers it.
-fn source(doc: &Document, texture: usize) -> Option<usize> {
+pub(super) fn source(doc: &Document, texture: usize) -> Option<usize> {
     let json = doc.root.textures.get(texture)?;
     let webp = json.extensions.as_ref().and_then(|e| e.others.get("EXT_texture_webp"));
     let webp = webp.and_then(|v| v["source"].as_u64()).map(|n| n as usize);
