@@ -56,12 +56,12 @@ impl Places {
 
     /// Room for a triangle's places, and where it starts.
     #[inline(always)]
-    fn room(&mut self, seen: &[u32]) -> (usize, &mut [u16; MOST]) {
+    fn room(&mut self, seen: &[u32]) -> (usize, &mut [u16]) {
         let mut start = self.end();
         if start + MOST > self.at.len() {
             start = self.make_room(seen);
         }
-        (start, (&mut self.at[start..start + MOST]).try_into().expect("as much"))
+        (start, &mut self.at[start..start + MOST])
     }
 
     #[inline(never)]
@@ -325,10 +325,8 @@ impl Walk {
         v.touch(self.x, self.y);
         let (z, ids) = (&mut v.z[..], &mut v.id[..]);
         if samples > 1 {
-            return self.visit(
-                samples,
-                &mut Fill::<_, false> { z, ids, id: self.id, keep, places: &mut [0; MOST], n: 0 },
-            );
+            return self
+                .visit(samples, &mut Fill::<_, false> { z, ids, id: self.id, keep, places: &mut [], n: 0 });
         }
         let (start, places) = v.places.room(ids);
         let mut fill = Fill::<_, true> { z, ids, id: self.id, keep, places, n: 0 };
@@ -374,7 +372,7 @@ struct Fill<'a, K, const LIST: bool> {
     ids: &'a mut [u32],
     id: u32,
     keep: K,
-    places: &'a mut [u16; MOST],
+    places: &'a mut [u16],
     n: usize,
 }
 
@@ -399,7 +397,9 @@ impl<K: Keep, const LIST: bool> Visitor for Fill<'_, K, LIST> {
             ids[k] = new.0[k] as u32;
         }
         if LIST {
-            self.places[self.n % MOST] = at as u16;
+            if let Some(place) = self.places.get_mut(self.n) {
+                *place = at as u16;
+            }
             self.n += 1;
         }
     }

@@ -16,6 +16,9 @@
 //! pixels listed by triangle through the whole tile, and colours encoded as they are shaded took 26 % off; texels decoded once,
 //! four bytes each and two in one load (`sample`), another 15 %.
 //!
+//! What is lit by nothing but lamps has a kernel that is as wide as the machine (`clay`): a sphere of 10,000 triangles in 1920×1080 takes
+//! 5.6 ms instead of 6.8 with it and with lists of where triangles won (`fill::Places`).
+//!
 //! The processor does nearly four instructions a cycle here, so that their number is what counts (`valgrind --tool=callgrind` gives
 //! it to the last one). Most of what went since were numbers looked up one by one and computed with at once, which the
 //! compiler then leaves single: they go through memory (`setup`, `surface`).
