@@ -97,7 +97,7 @@ impl Machine {
         let able = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
         #[cfg(not(target_arch = "x86_64"))]
         let able = false;
-        Self(able && isa == Isa::Best)
+        Self(able && isa != Isa::Portable)
     }
 
     #[inline(always)]
