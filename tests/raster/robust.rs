@@ -198,3 +198,26 @@ fn small_triangles_are_counted_exactly() {
     let ids = stage.ids(8).0;
     assert_eq!((ids.triangles[3 * 8], ids.triangles[3 * 8 + 2]), (6, 7), "the nearest of each pile");
 }
+
+#[test]
+fn layers_drawn_from_back_to_front_and_parts_of_clipped_triangles_are_shaded_once() {
+    // So many layers win everywhere in turn that where the first ones won is forgotten meanwhile.
+    let mut stage = Stage::of(from_front(5.0, 2.0), Mesh::default(), Material::default());
+    (stage.meshes, stage.materials) = (vec![], vec![]);
+    for k in 0..200 {
+        stage.meshes.push((Mesh::new(quad(1.0, 0.001 * k as f32)).unwrap(), k));
+        stage.materials.push(material(Vec4::new(0.0, f32::from(u8::from(k == 199)), 0.5, 1.0)));
+    }
+    let (picture, stats) = stage.bytes(128, 1);
+    assert!(picture.data.chunks(4).all(|p| p == &picture.data[..4] && p[1] == 255));
+    assert_eq!((stats.samples, stats.shaded), (128 * 128, 128 * 128));
+
+    // A floor that runs behind the eye is cut into parts.
+    let positions = [[-9.0, -1.0, 4.0], [9.0, -1.0, 4.0], [0.0, -1.0, -30.0]].map(Vec3::from_array).to_vec();
+    let camera = perspective(Vec3::new(0.0, 0.0, 2.0), Vec3::ZERO, 1.4);
+    let floor = Stage::of(camera, mesh(positions, vec![[0, 1, 2]]), material(Vec4::ONE));
+    let (picture, stats) = floor.bytes(150, 1);
+    let seen = picture.data.chunks(4).filter(|p| p[3] == 255).count() as u64;
+    assert!(stats.clipped == 1 && seen > 5000);
+    assert_eq!((stats.samples, stats.shaded), (seen, seen));
+}

@@ -88,7 +88,7 @@ pub(super) fn resolve(
     // What was found for another scene means nothing here.
     scratch.last_draw = LastDraw::default();
     if frame.samples == 1 {
-        scan::look(bins, tile, scratch);
+        scan::look(bins, tile, area, scratch);
     } else {
         scan::scan(frame, area, scratch);
     }

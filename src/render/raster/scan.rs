@@ -129,9 +129,9 @@ impl Entries {
         }
     }
 
-    /// List the pixels that show a triangle among those where it won; their number.
+    /// List the pixels of a tile, `w` wide, that show a triangle among those where it won; their number.
     #[inline(always)]
-    fn find(&mut self, ids: &[u32; TILE * TILE], id: u32, places: &[u16]) -> u32 {
+    fn find(&mut self, ids: &[u32; TILE * TILE], w: usize, id: u32, places: &[u16]) -> u32 {
         let last = self.chains.last().copied();
         let first = last.map_or(0, |c| c.first + c.count + ROOM as u32);
         let most = first as usize + 8 * places.len() + ROOM;
@@ -142,6 +142,10 @@ impl Entries {
         for &place in places {
             let place = (place as usize).min(TILE * TILE - 8);
             let mut mask = load(&ids[place..]).equal(I8::splat(id as i32)).bitmask();
+            if place % TILE + 8 > w {
+                // Eight side by side may reach beyond the picture.
+                mask &= (1 << (w - place % TILE)) - 1;
+            }
             while mask != 0 {
                 let k = mask.trailing_zeros();
                 // What is written beyond the run's end is overwritten by the next.
@@ -205,12 +209,12 @@ impl Entries {
 
 /// Find what has to be shaded in a tile at one sample a pixel: every triangle is looked for where it has won.
 #[inline(always)]
-pub(super) fn look(bins: &[Bins], tile: usize, scratch: &mut TileScratch) {
+pub(super) fn look(bins: &[Bins], tile: usize, area: Area, scratch: &mut TileScratch) {
     let TileScratch { entries, seen, stats, .. } = scratch;
     entries.start();
     let ids = seen.id[..TILE * TILE].try_into().expect("a tile");
     for (id, places) in seen.places.iter() {
-        stats.samples += entries.find(ids, id, places) as u64;
+        stats.samples += entries.find(ids, area.w, id, places) as u64;
     }
     for bins in bins {
         for f in &bins.tiles[tile].fragments {
