@@ -4,7 +4,7 @@ use crate::cli::{fails, files, folder, path, sinew, text};
 use crate::rng::Rng;
 use std::path::Path;
 use std::process::Command;
-use std::time::Duration;
+use std::time::Instant;
 
 /// Names and bytes of a folder.
 fn contents(dir: &Path) -> Vec<(String, Vec<u8>)> {
@@ -27,7 +27,9 @@ fn a_killed_export_leaves_whole_files_and_is_finished_to_the_same_bytes() {
             .map(String::from)
     };
     let run = |out: &str| Command::new(env!("CARGO_BIN_EXE_sinew")).args(args(out)).spawn().unwrap();
+    let start = Instant::now();
     assert!(run(&whole).wait().unwrap().success());
+    let took = start.elapsed();
     let want = contents(&dir.path().join("whole"));
     assert_eq!(want.len(), 200);
 
@@ -35,7 +37,7 @@ fn a_killed_export_leaves_whole_files_and_is_finished_to_the_same_bytes() {
     let mut interrupted = 0;
     for round in 0..20 {
         let mut child = run(&parts);
-        std::thread::sleep(Duration::from_millis(rng.range(1.0, 150.0) as u64));
+        std::thread::sleep(took.mul_f64(rng.range(0.02, 0.6)));
         let _ = child.kill();
         interrupted += usize::from(!child.wait().unwrap().success());
         if !dir.path().join("parts").exists() {

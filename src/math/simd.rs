@@ -289,13 +289,27 @@ impl<const N: usize> I<N> {
     /// Any sign set.
     #[inline(always)]
     pub fn any(self) -> bool {
-        self.bitmask() != 0
+        self.fours(|a, b| a | b) != 0
     }
 
     /// All signs set.
     #[inline(always)]
     pub fn all(self) -> bool {
-        self.bitmask() == (1 << N) - 1
+        self.fours(|a, b| a & b) == 0xf
+    }
+
+    /// Signs of the fours folded into one.
+    #[inline(always)]
+    fn fours(self, fold: impl Fn(i32, i32) -> i32) -> u32 {
+        let mut r = [self.0[0], self.0[1], self.0[2], self.0[3]];
+        let mut i = 4;
+        while i < N {
+            for k in 0..4 {
+                r[k] = fold(r[k], self.0[i + k]);
+            }
+            i += 4;
+        }
+        Vec4::from_array(r.map(|x| f32::from_bits(x as u32))).is_negative_bitmask()
     }
 
     /// One bit a lane, for at most 16 of them: the sign.

@@ -116,15 +116,15 @@ impl Default for Settings {
     }
 }
 
-/// Do every task, each on its own thread if there is more than one.
+/// Do every task, the first on this thread and each other one on its own.
 fn each<T: Send>(tasks: Vec<T>, work: impl Fn(T) + Sync) {
-    if tasks.len() <= 1 {
-        return tasks.into_iter().for_each(work);
-    }
     std::thread::scope(|s| {
+        let mut tasks = tasks.into_iter();
+        let own = tasks.next();
         for task in tasks {
             s.spawn(|| work(task));
         }
+        own.into_iter().for_each(&work);
     });
 }
 

@@ -3,7 +3,7 @@
 use crate::image::color::LINEAR_OF_SRGB8;
 use crate::math::power;
 use crate::math::simd::{self, F, I, Isa, Kernel};
-use crate::scene::texels::{self, Level, PACKED};
+use crate::scene::texels::{Level, PACKED};
 use crate::scene::{Filter, Texture, WrapMode};
 use std::sync::LazyLock;
 
@@ -223,7 +223,7 @@ fn add_packed<const N: usize>(
         let [left, right] = match (all, same) {
             (true, true) => pairs::<true, N>(&whole, at[j]),
             (true, false) => pairs::<false, N>(&whole, at[j]),
-            _ => pieces(t, levels, level, at[j]),
+            _ => single(t, levels, level, at[j]),
         };
         add_squares(sum, left, weights[j][0]);
         add_squares(sum, right, weights[j][1]);
@@ -248,15 +248,17 @@ fn pairs<const SAME: bool, const N: usize>(levels: &[&[u32]; N], at: I<N>) -> [I
     [left, right]
 }
 
-/// The same where not all of a level is there.
+/// The same where not all levels are decoded.
 #[inline(never)]
-fn pieces<const N: usize>(t: &Texture, levels: &[Level<u32>], level: I<N>, at: I<N>) -> [I<N>; 2] {
+fn single<const N: usize>(t: &Texture, levels: &[Level<u32>], level: I<N>, at: I<N>) -> [I<N>; 2] {
     let (mut left, mut right) = (I::ZERO, I::ZERO);
     for k in 0..N {
         let number = level.0[k] as usize;
-        let pair = levels[number].pair(at.0[k] as u32 as usize, |range| texels::packed(t, number, range));
+        let pair = levels[number].pair(t, number, at.0[k] as u32 as usize);
         (left.0[k], right.0[k]) = (pair[0] as i32, pair[1] as i32);
     }
+    // That the lanes mostly agree in their level is good enough for a count.
+    levels[level.0[0] as usize].count(t, level.0[0] as usize, 2 * N);
     [left, right]
 }
 
@@ -280,7 +282,10 @@ fn add_wide<const N: usize>(t: &Texture, uv: &Uv<N>, level: I<N>, weight: F<N>, 
     for k in 0..N {
         let number = level.0[k] as usize;
         let texels = &t.wide()[number];
-        let row = |j: usize| texels.pair(at[j].0[k] as usize, |range| texels::wide(t, number, range));
+        let row = |j: usize| texels.pair(t, number, at[j].0[k] as usize);
+        if k == 0 && texels.whole().is_none() {
+            texels.count(t, number, 4 * N);
+        }
         let (upper, lower) = (row(0), row(1));
         for c in 0..4 {
             let mean = |row: &[[u16; 4]; 2], w: &[F<N>; 2]| {

@@ -22,47 +22,56 @@ static CODES: LazyLock<Vec<u8>> = LazyLock::new(|| {
     codes
 });
 
-/// All levels down to 1×1; each side is half of the one before, rounded down, at least 1.
-pub(super) fn chain(width: u32, height: u32, rgba: Vec<u8>, content: Content) -> Vec<Vec<u8>> {
+/// All levels down to 1×1, and whether every texel is opaque; each side is half of the one before, rounded down, at least 1.
+pub(super) fn chain(width: u32, height: u32, rgba: Vec<u8>, content: Content) -> (Vec<Vec<u8>>, bool) {
     let (mut w, mut h) = (width as usize, height as usize);
-    let mut levels = vec![rgba];
+    let (mut levels, mut opaque) = (vec![rgba], None);
     while w > 1 || h > 1 {
         let last = &levels[levels.len() - 1];
         let next = match content {
-            Content::Color => half_srgb::<true>(last, w, h),
-            Content::ColorAndNumber => half_srgb::<false>(last, w, h),
             Content::Numbers => half_linear(last, w, h),
+            Content::Color | Content::ColorAndNumber => {
+                let even = w.is_multiple_of(2) && h.is_multiple_of(2);
+                let short = even.then(|| half_opaque(last, w));
+                opaque = opaque.or(short.as_ref().map(Option::is_some).filter(|_| levels.len() == 1));
+                short.flatten().unwrap_or_else(|| half_srgb(content, last, w, h))
+            }
         };
         levels.push(next);
         (w, h) = ((w / 2).max(1), (h / 2).max(1));
     }
-    levels
+    let opaque = opaque.unwrap_or_else(|| is_opaque(&levels[0]));
+    (levels, opaque)
+}
+
+fn is_opaque(rgba: &[u8]) -> bool {
+    rgba.chunks(4096).all(|c| c.as_chunks::<4>().0.iter().fold(255, |a, t| a & t[3]) == 255)
 }
 
 /// Linear light of each 8-bit sRGB code in 65535ths.
 static LINEAR16: LazyLock<[u32; 256]> =
     LazyLock::new(|| std::array::from_fn(|i| (LINEAR_OF_SRGB8[i] * 65535.0 + 0.5) as u32));
 
-fn half_srgb<const COVERAGE: bool>(from: &[u8], w: usize, h: usize) -> Vec<u8> {
-    let even = w.is_multiple_of(2) && h.is_multiple_of(2);
-    if let Some(level) = even.then(|| half_opaque(from, w)).flatten() {
-        return level;
-    }
+fn half_srgb(content: Content, from: &[u8], w: usize, h: usize) -> Vec<u8> {
     let (linear, codes) = (&*LINEAR_OF_SRGB8, &**CODES);
-    half::<COVERAGE>(from, w, h, |c| linear[c as usize], |v| codes[(v * 65535.0 + 0.5) as usize & 0xffff])
+    let (decode, encode) = (|c| linear[c as usize], |v: f32| codes[(v * 65535.0 + 0.5) as usize & 0xffff]);
+    match content {
+        Content::Color => half::<true>(from, w, h, decode, encode),
+        _ => half::<false>(from, w, h, decode, encode),
+    }
 }
 
-/// Bytes of a level from which on several threads are worth their start.
+/// Bytes of a level that are worth a thread.
 const PARALLEL: usize = 2 << 20;
+
+/// Threads at most: asking how many processors there are would take as long as a tenth of a level.
+const WORKERS: usize = 8;
 
 /// The plain mean of four opaque texels: most pictures have even sides and no holes, and this takes a third of the time.
 /// `None` where a texel is not opaque.
 fn half_opaque(from: &[u8], w: usize) -> Option<Vec<u8>> {
     let mut out = vec![0; from.len() / 4];
-    let workers = match from.len() {
-        0..PARALLEL => 1,
-        _ => std::thread::available_parallelism().map_or(1, |n| n.get()),
-    };
+    let workers = (from.len() / PARALLEL).clamp(1, WORKERS);
     // Bands of rows, the first on this thread; each texel is made once, so their number changes nothing.
     let rows = (from.len() / (8 * w)).div_ceil(workers).max(1);
     let opaque = std::thread::scope(|scope| {
@@ -164,11 +173,11 @@ mod tests {
 
     #[test]
     fn black_and_white_meet_in_linear_light() {
-        let levels = chain(2, 1, vec![0, 0, 0, 255, 255, 255, 255, 255], Content::Color);
+        let levels = chain(2, 1, vec![0, 0, 0, 255, 255, 255, 255, 255], Content::Color).0;
         // sRGB of one half is 187.5.
         assert_eq!(levels[1], [188, 188, 188, 255]);
         assert_eq!(
-            chain(2, 1, vec![0, 10, 0, 255, 255, 20, 255, 255], Content::Numbers)[1],
+            chain(2, 1, vec![0, 10, 0, 255, 255, 20, 255, 255], Content::Numbers).0[1],
             [128, 15, 128, 255]
         );
     }
@@ -178,10 +187,8 @@ mod tests {
         let picture: Vec<u8> = (0..64 * 32)
             .flat_map(|i| [i * 7 % 256, i * 13 % 251, i * i % 256, 255].map(|v| v as u8))
             .collect();
-        let (linear, codes) = (&*LINEAR_OF_SRGB8, &**CODES);
-        let long =
-            half::<true>(&picture, 64, 32, |c| linear[c as usize], |v| codes[(v * 65535.0 + 0.5) as usize]);
-        let off = half_srgb::<true>(&picture, 64, 32).iter().zip(&long).map(|(a, b)| a.abs_diff(*b)).max();
+        let (long, short) = (half_srgb(Content::Color, &picture, 64, 32), half_opaque(&picture, 64));
+        let off = short.expect("no hole").iter().zip(&long).map(|(a, b)| a.abs_diff(*b)).max();
         assert!(off <= Some(1), "{off:?}");
     }
 
@@ -196,12 +203,12 @@ mod tests {
         let last = picture.len() - 1;
         picture[last] = 254;
         assert_eq!(half_opaque(&picture, w), None);
-        assert_eq!(half_srgb::<true>(&picture, w, h)[whole.len() - 1], 255);
+        assert_eq!(half_srgb(Content::Color, &picture, w, h)[whole.len() - 1], 255);
     }
 
     #[test]
     fn what_is_invisible_does_not_bleed() {
-        let levels = chain(2, 1, vec![200, 100, 50, 255, 0, 255, 0, 0], Content::Color);
+        let levels = chain(2, 1, vec![200, 100, 50, 255, 0, 255, 0, 0], Content::Color).0;
         assert_eq!(levels[1], [200, 100, 50, 128]);
     }
 
@@ -209,10 +216,10 @@ mod tests {
     fn odd_sizes_keep_the_mean() {
         // Five texels to two: the middle one counts half in each.
         let row: Vec<u8> = [10, 20, 30, 40, 50].iter().flat_map(|&v| [v, v, v, 255]).collect();
-        let levels = chain(5, 1, row, Content::Numbers);
+        let levels = chain(5, 1, row, Content::Numbers).0;
         assert_eq!(levels.iter().map(|l| l.len() / 4).collect::<Vec<_>>(), [5, 2, 1]);
         assert_eq!((levels[1][0], levels[1][4], levels[2][0]), (18, 42, 30));
-        let flat = chain(7, 3, vec![77; 4 * 21], Content::Color);
+        let flat = chain(7, 3, vec![77; 4 * 21], Content::Color).0;
         assert!(flat.iter().flatten().all(|&v| v == 77));
     }
 }

@@ -2,15 +2,14 @@
 
 use super::{Texture, WrapMode};
 use crate::image::color::LINEAR_OF_SRGB8;
-use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{LazyLock, OnceLock};
 
-/// Decoded levels, in pieces that are each made when one of their texels is first asked for: pictures seldom need the finest level, and
-/// hardly ever all of it.
+/// Decoded levels, each made when as many of its texels were asked for as it has: pictures seldom need the finest level, one picture
+/// alone hardly ever all of any, and until then each look decodes for itself.
 ///
-/// A level lies row by row. Each row has one texel more, which is what lies right of its last, and each piece too, which is the first
-/// of the next, so that two neighbours always lie side by side.
+/// A level lies row by row. Each row has one texel more, which is what lies right of its last, so that two neighbours always lie side
+/// by side.
 #[derive(Clone, Debug)]
 pub(super) enum Texels {
     /// Square roots of linear light: 11 bits of red, 11 of green, 10 of blue. Opaque colours; to a tenth of an sRGB code.
@@ -19,19 +18,15 @@ pub(super) enum Texels {
     Wide(Vec<Level<[u16; 4]>>),
 }
 
-/// A level: pieces, and all of it once half of them have been made, as no question then needs to be asked at every texel.
+/// A level.
 #[derive(Debug)]
 pub(crate) struct Level<T> {
-    pieces: Vec<OnceLock<Vec<T>>>,
-    made: AtomicUsize,
+    /// Texels a row, and the one beyond.
+    stride: usize,
+    rows: usize,
+    asked: AtomicUsize,
     whole: OnceLock<Vec<T>>,
 }
-
-/// A level of so few pieces is made at once.
-const FEW: usize = 16;
-
-/// Texels of a piece.
-const PIECE: usize = 1 << 12;
 
 /// They follow from the bytes, so two are never different where the bytes are not.
 impl PartialEq for Texels {
@@ -46,26 +41,49 @@ pub(crate) const PACKED: [f32; 3] = [2047.0, 2047.0, 1023.0];
 impl Texels {
     /// Of a chain of levels that starts with so many pixels.
     pub fn new(width: u32, height: u32, levels: usize, packed: bool) -> Self {
-        let texels = |k: usize| ((width >> k).max(1) as usize + 1) * (height >> k).max(1) as usize;
-        let pieces = |k: usize| texels(k).div_ceil(PIECE);
+        let size = |k: usize| ((width >> k).max(1) as usize + 1, (height >> k).max(1) as usize);
         if packed {
-            return Self::Packed((0..levels).map(|k| Level::new(pieces(k))).collect());
+            return Self::Packed((0..levels).map(|k| Level::new(size(k))).collect());
         }
-        Self::Wide((0..levels).map(|k| Level::new(pieces(k))).collect())
+        Self::Wide((0..levels).map(|k| Level::new(size(k))).collect())
+    }
+}
+
+/// A texel as a filter reads it.
+pub(crate) trait Texel: Copy {
+    /// How it follows from RGBA bytes.
+    fn decode(t: &Texture) -> impl Fn(&[u8; 4]) -> Self;
+}
+
+impl Texel for u32 {
+    #[inline(always)]
+    fn decode(_: &Texture) -> impl Fn(&[u8; 4]) -> Self {
+        let table = &*ROOTS;
+        |t| table[0][t[0] as usize] | table[1][t[1] as usize] | table[2][t[2] as usize]
+    }
+}
+
+impl Texel for [u16; 4] {
+    #[inline(always)]
+    fn decode(t: &Texture) -> impl Fn(&[u8; 4]) -> Self {
+        let table = t.srgb().then(|| &*LINEAR16);
+        move |t| match table {
+            Some(l) => [l[t[0] as usize], l[t[1] as usize], l[t[2] as usize], t[3] as u16 * 257],
+            None => t.map(|v| v as u16 * 257),
+        }
     }
 }
 
 /// A copy decodes for itself.
-impl<T: Copy> Clone for Level<T> {
+impl<T: Texel> Clone for Level<T> {
     fn clone(&self) -> Self {
-        Self::new(self.pieces.len())
+        Self::new((self.stride, self.rows))
     }
 }
 
-impl<T: Copy> Level<T> {
-    fn new(pieces: usize) -> Self {
-        let pieces = (0..pieces).map(|_| OnceLock::new()).collect();
-        Self { pieces, made: AtomicUsize::new(0), whole: OnceLock::new() }
+impl<T: Texel> Level<T> {
+    fn new((stride, rows): (usize, usize)) -> Self {
+        Self { stride, rows, asked: AtomicUsize::new(0), whole: OnceLock::new() }
     }
 
     /// All of it, if it is there.
@@ -74,46 +92,49 @@ impl<T: Copy> Level<T> {
         self.whole.get().map(Vec::as_slice)
     }
 
-    /// A texel, by its place in the level, and its right neighbour; `make` makes a range of texels.
+    /// A texel, by its place in the level `k` of the texture, and its right neighbour.
     #[inline(always)]
-    pub fn pair(&self, place: usize, make: impl Fn(Range<usize>) -> Vec<T>) -> [T; 2] {
-        let piece = &self.pieces[place / PIECE];
-        let texels = match piece.get() {
-            Some(texels) => texels,
-            None => return self.fresh(place, make),
-        };
-        [texels[place % PIECE], texels[place % PIECE + 1]]
-    }
-
-    fn fresh(&self, place: usize, make: impl Fn(Range<usize>) -> Vec<T>) -> [T; 2] {
-        let pieces = self.pieces.len();
-        if pieces <= FEW || 2 * self.made.fetch_add(1, Ordering::Relaxed) >= pieces {
-            let whole = self.whole.get_or_init(|| make(0..usize::MAX));
-            return [whole[place], whole[place + 1]];
+    pub fn pair(&self, t: &Texture, k: usize, place: usize) -> [T; 2] {
+        match self.whole() {
+            Some(texels) => [texels[place], texels[place + 1]],
+            None => self.decoded_pair(t, k, place),
         }
-        let (piece, at) = (place / PIECE, place % PIECE);
-        let texels = self.pieces[piece].get_or_init(|| make(PIECE * piece..PIECE * (piece + 1) + 1));
-        [texels[at], texels[at + 1]]
+    }
+
+    #[inline(always)]
+    fn decoded_pair(&self, t: &Texture, k: usize, place: usize) -> [T; 2] {
+        let decode = T::decode(t);
+        let width = self.stride - 1;
+        let (y, x) = (place as u32 / self.stride as u32, place as u32 % self.stride as u32);
+        let row = &t.levels()[k].as_chunks::<4>().0[y as usize * width..][..width];
+        let next = if x as usize + 1 < width { x as usize + 1 } else { beyond(t, width) };
+        [decode(&row[x as usize]), decode(&row[next])]
+    }
+
+    /// Say that so many texels were asked for; who asks for the last that is missing decodes the level.
+    #[inline(never)]
+    pub fn count(&self, t: &Texture, k: usize, texels: usize) {
+        let all = self.stride * self.rows;
+        let before = self.asked.fetch_add(texels, Ordering::Relaxed);
+        if before < all && before + texels >= all {
+            let _ = self.whole.set(self.decoded(t, k));
+        }
+    }
+
+    fn decoded(&self, t: &Texture, k: usize) -> Vec<T> {
+        let (decode, width) = (T::decode(t), self.stride - 1);
+        let mut out = Vec::with_capacity(self.stride * self.rows);
+        for row in t.levels()[k].as_chunks::<4>().0.chunks_exact(width) {
+            out.extend(row.iter().map(&decode));
+            out.push(decode(&row[beyond(t, width)]));
+        }
+        out
     }
 }
 
-/// Texels of a packed level.
-#[inline(never)]
-pub(crate) fn packed(t: &Texture, level: usize, range: Range<usize>) -> Vec<u32> {
-    let table = &*ROOTS;
-    decoded(t, level, range, |t| (0..3).fold(0, |w, c| w | table[c][t[c] as usize]))
-}
-
-/// Texels of a wide level.
-#[inline(never)]
-pub(crate) fn wide(t: &Texture, level: usize, range: Range<usize>) -> Vec<[u16; 4]> {
-    let table = &*LINEAR16;
-    if !t.srgb() {
-        return decoded(t, level, range, |t| t.map(|v| v as u16 * 257));
-    }
-    let linear =
-        |t: &[u8; 4]| [table[t[0] as usize], table[t[1] as usize], table[t[2] as usize], t[3] as u16 * 257];
-    decoded(t, level, range, linear)
+/// The column of what lies right of the last: the first again, or the last itself.
+fn beyond(t: &Texture, width: usize) -> usize {
+    if t.wrap()[0] == WrapMode::Repeat { 0 } else { width - 1 }
 }
 
 /// Linear light of each sRGB code in 65535ths: wrong by less than a thirtieth of a code.
@@ -127,29 +148,6 @@ static ROOTS: LazyLock<[[u32; 256]; 3]> = LazyLock::new(|| {
     })
 });
 
-/// Decode a range of a level's texels, as far as there are any; rows end in their first texel again if they repeat, in their last otherwise.
-fn decoded<T>(t: &Texture, level: usize, range: Range<usize>, decode: impl Fn(&[u8; 4]) -> T) -> Vec<T> {
-    let texels = t.levels()[level].as_chunks::<4>().0;
-    let width = (t.width() as usize >> level).max(1);
-    let last = if t.wrap()[0] == WrapMode::Repeat { 0 } else { width - 1 };
-    let end = range.end.min(texels.len() / width * (width + 1));
-    let count = end.saturating_sub(range.start);
-    let mut out = Vec::with_capacity(count);
-    let mut column = range.start % (width + 1);
-    for row in texels.chunks_exact(width).skip(range.start / (width + 1)) {
-        let left = count - out.len();
-        out.extend(row[column..].iter().take(left).map(&decode));
-        if left > width - column {
-            out.push(decode(&row[last]));
-        }
-        column = 0;
-        if out.len() == count {
-            break;
-        }
-    }
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -160,11 +158,14 @@ mod tests {
         Texture::new(size[0], size[1], bytes, content, [wrap; 2], Filter::Trilinear).expect("it fits")
     }
 
+    fn whole<T: Texel>(t: &Texture) -> Vec<T> {
+        Level::new((t.width() as usize + 1, t.height() as usize)).decoded(t, 0)
+    }
+
     #[test]
     fn packed_texels_are_right_to_a_fifth_of_a_code_and_come_back() {
         let bytes: Vec<u8> = (0..=255u8).flat_map(|v| [v, v, v, 255]).collect();
-        let t = texture([256, 1], bytes, Content::Color, WrapMode::Repeat);
-        let row = packed(&t, 0, 0..usize::MAX);
+        let row = whole::<u32>(&texture([256, 1], bytes, Content::Color, WrapMode::Repeat));
         assert_eq!(row[256], row[0]);
         for (v, w) in row[..256].iter().enumerate() {
             for (c, root) in [w & 2047, w >> 11 & 2047, w >> 22].into_iter().enumerate() {
@@ -179,31 +180,32 @@ mod tests {
     fn wide_texels_keep_alpha_and_numbers() {
         let bytes = vec![0, 255, 51, 128, 255, 0, 0, 0];
         let numbers = texture([2, 1], bytes.clone(), Content::Numbers, WrapMode::Clamp);
-        let row = wide(&numbers, 0, 0..usize::MAX);
-        assert_eq!(row[..3].as_flattened(), [0, 65535, 13107, 32896, 65535, 0, 0, 0, 65535, 0, 0, 0]);
+        let row = whole::<[u16; 4]>(&numbers);
+        assert_eq!(row.as_flattened(), [0, 65535, 13107, 32896, 65535, 0, 0, 0, 65535, 0, 0, 0]);
         let colors = texture([2, 1], bytes, Content::Color, WrapMode::Clamp);
-        assert_eq!(wide(&colors, 0, 0..1)[0], [0, 65535, 2170, 32896]);
+        assert_eq!(whole::<[u16; 4]>(&colors)[0], [0, 65535, 2170, 32896]);
     }
 
     #[test]
-    fn pieces_hold_what_the_level_does_and_their_neighbours() {
-        // 618 texels a row: pieces end anywhere in one.
-        let (w, h) = (617usize, 131usize);
+    fn a_look_finds_the_same_before_and_after_the_level_is_made() {
+        let (w, h) = (61usize, 13usize);
         let bytes: Vec<u8> = (0..w * h).flat_map(|i| [i as u8, (i >> 8) as u8, 7, 3]).collect();
         for (wrap, end) in [(WrapMode::Repeat, 0), (WrapMode::Clamp, w - 1)] {
             let t = texture([w as u32, h as u32], bytes.clone(), Content::Numbers, wrap);
-            let Texels::Wide(levels) = Texels::new(w as u32, h as u32, 1, false) else { panic!("asked for") };
+            let level = &t.wide()[0];
             let texel = |y: usize, x: usize| {
                 let i = 4 * (y * w + if x == w { end } else { x });
                 [0, 1, 2, 3].map(|c| bytes[i + c] as u16 * 257)
             };
-            for (y, x) in (0..h).flat_map(|y| (0..w).map(move |x| (y, x))) {
-                let found = levels[0].pair(y * (w + 1) + x, |range| wide(&t, 0, range));
-                assert_eq!(found, [texel(y, x), texel(y, x + 1)], "{y} {x}");
+            for made in [false, true] {
+                for (y, x) in (0..h).flat_map(|y| (0..w).map(move |x| (y, x))) {
+                    let pair = level.pair(&t, 0, y * (w + 1) + x);
+                    assert_eq!(pair, [texel(y, x), texel(y, x + 1)], "{y} {x} {made}");
+                    level.count(&t, 0, 1);
+                    assert_eq!(level.whole().is_some(), made);
+                }
+                level.count(&t, 0, h);
             }
-            let whole = levels[0].whole().expect("all pieces have been made");
-            assert_eq!(whole.len(), (w + 1) * h);
-            assert!(whole.iter().enumerate().all(|(i, &t)| t == texel(i / (w + 1), i % (w + 1))));
         }
     }
 }

@@ -83,8 +83,7 @@ impl Texture {
         if expected == 0 || rgba.len() as u64 != expected {
             return Err(TextureError { width, height, expected, found: rgba.len() as u64 });
         }
-        let opaque = rgba.chunks(4096).all(|c| c.as_chunks::<4>().0.iter().fold(255, |a, t| a & t[3]) == 255);
-        let levels = super::mips::chain(width, height, rgba, content);
+        let (levels, opaque) = super::mips::chain(width, height, rgba, content);
         let texels = Texels::new(width, height, levels.len(), opaque && content != Content::Numbers);
         Ok(Self { width, height, content, wrap, filter, levels, texels })
     }

@@ -91,15 +91,6 @@ impl<'a> Document<'a> {
         Ok((self.slice(view.buffer.value(), offset, view.byte_length.0, &at)?, view))
     }
 
-    /// The bytes of a buffer view that is there and not compressed: nothing is decoded or charged for them.
-    pub fn plain(&self, index: usize) -> Option<&[u8]> {
-        let view = self.root.buffer_views.get(index)?;
-        if compressed::meshopt(view, "").ok()?.is_some() {
-            return None;
-        }
-        self.slice(view.buffer.value(), view.byte_offset.map_or(0, |o| o.0), view.byte_length.0, "").ok()
-    }
-
     /// A range of a buffer.
     fn slice(&self, buffer: usize, offset: u64, length: u64, place: &str) -> Result<&[u8]> {
         let blob = entry(&self.blob_of, buffer, "buffer", || format!("{place}.buffer"))?;

@@ -5,7 +5,7 @@ use super::document::Document;
 use super::error::Result;
 use super::geometry::Geometry;
 use super::pictures::Ahead;
-use super::textures::{self, Slot, Textures};
+use super::textures::{Slot, Textures};
 use super::warnings::Warnings;
 use crate::io::Options;
 use crate::scene::{AlphaMode, Content, Material, Texture};
@@ -41,13 +41,6 @@ pub(super) fn build(
         materials.push(one(&json::Material::default(), "default".into(), &mut textures, w));
     }
     Ok(Looks { materials, textures: textures.finish() })
-}
-
-/// The first image that the first mesh with maps asks for: whether it is drawn is for its triangles to say.
-pub(super) fn first_image(doc: &Document) -> Option<usize> {
-    let primitives = doc.root.meshes.iter().flat_map(|m| &m.primitives);
-    let materials = primitives.filter_map(|p| doc.root.materials.get(p.material?.value()));
-    materials.flat_map(slots).find_map(|slot| textures::source(doc, slot.texture))
 }
 
 /// Every reference to a texture that is looked at.

@@ -17,6 +17,7 @@ mod draco;
 mod error;
 mod extensions;
 mod geometry;
+mod glance;
 mod influences;
 mod keys;
 mod material;
@@ -85,12 +86,11 @@ pub fn import_bytes(
 ) -> std::result::Result<Import, GltfError> {
     let mut w = Warnings::default();
     let parts = container::split(bytes, name)?;
-    let root = mend::root(parts.json, &mut w)?;
-    extensions::check(&root, &mut w)?;
-    let doc = Document::new(root, parts.bin, base_dir, &mut w)?;
     std::thread::scope(|scope| {
-        let first = options.textures.then(|| material::first_image(&doc)).flatten();
-        let ahead = first.and_then(|image| pictures::Ahead::begin(scope, &doc, image));
+        let ahead = options.textures.then(|| pictures::Ahead::begin(scope, &parts)).flatten();
+        let root = mend::root(parts.json, &mut w)?;
+        extensions::check(&root, &mut w)?;
+        let doc = Document::new(root, parts.bin, base_dir, &mut w)?;
         assemble(&doc, base_dir, options, ahead, w)
     })
 }

@@ -1,6 +1,8 @@
 //! Pictures: bytes from the file or beside it, decoded on all cores.
 
+use super::container::Parts;
 use super::document::Document;
+use super::glance;
 use super::uri::Source;
 use super::warnings::Warnings;
 use std::borrow::Cow;
@@ -78,20 +80,19 @@ type Job<'a> = Result<Cow<'a, [u8]>, String>;
 const LONG: usize = 1 << 16;
 
 /// A picture that is decoded while the rest of the file is read: what most often takes longer than all else, so that it should not wait
-/// for what the file's triangles say of it.
+/// for what the file says besides.
 pub(super) struct Ahead<'s> {
-    view: usize,
-    picture: ScopedJoinHandle<'s, Result<Picture, String>>,
+    bytes: &'s [u8],
+    picture: ScopedJoinHandle<'s, Decoded>,
 }
 
 impl<'s> Ahead<'s> {
-    /// Begin with an image, if its bytes are in the file as they are and it is neither small nor larger than a file of no size allows.
-    pub fn begin<'d: 's>(scope: &'s Scope<'s, 'd>, doc: &'d Document, image: usize) -> Option<Self> {
-        let view = doc.root.images.get(image).filter(|i| i.uri.is_none())?.buffer_view?.value();
-        let bytes = doc.plain(view).filter(|b| b.len() >= LONG)?;
+    /// Begin with the picture that a [`glance`] finds in a GLB, if it is neither small nor larger than a file of no size allows.
+    pub fn begin<'e>(scope: &'s Scope<'s, 'e>, parts: &Parts<'s>) -> Option<Self> {
+        let bytes = glance::first_picture(parts).filter(|b| b.len() >= LONG)?;
         let mut budget = Budget { encoded: 0, pixels: PIXEL_BYTES, buffers: 0, allowed: 0 };
-        budget.admit(Cow::Borrowed(bytes)).ok()?;
-        Some(Self { view, picture: scope.spawn(move || decode(bytes)) })
+        let picture = scope.spawn(move || budget.admit(Cow::Borrowed(bytes)).ok().map(|b| decode(&b)));
+        Some(Self { bytes, picture })
     }
 }
 
@@ -127,8 +128,10 @@ pub(super) fn load(
     }
 
     // Decode; each worker takes the next picture that is left.
-    let begun = ahead.and_then(|a| Some((*known.get(&Key::View(a.view))?, a.picture)));
-    let begun = begun.filter(|b| jobs[b.0].is_ok());
+    let begun = ahead.and_then(|a| {
+        let same = |job: &Job| job.as_ref().is_ok_and(|b| std::ptr::eq(&**b, a.bytes));
+        Some((jobs.iter().position(same)?, a.picture))
+    });
     let mut list = Vec::with_capacity(jobs.len());
     for (i, (decoded, job)) in images.into_iter().zip(decode_all(&jobs, begun).into_iter().zip(&jobs)) {
         let refused = || Err(job.as_ref().err().cloned().unwrap_or_default());
@@ -208,10 +211,7 @@ fn limit() -> String {
 type Decoded = Option<Result<Picture, String>>;
 
 /// Decode all jobs, of which one may have `begun`.
-fn decode_all(
-    jobs: &[Job],
-    begun: Option<(usize, ScopedJoinHandle<Result<Picture, String>>)>,
-) -> Vec<Decoded> {
+fn decode_all(jobs: &[Job], begun: Option<(usize, ScopedJoinHandle<Decoded>)>) -> Vec<Decoded> {
     let is_begun = |i: usize| begun.as_ref().is_some_and(|b| b.0 == i);
     let slots: Vec<Mutex<Decoded>> = jobs.iter().map(|_| Mutex::new(None)).collect();
     let next = AtomicUsize::new(0);
@@ -234,7 +234,8 @@ fn decode_all(
     });
     let mut all: Vec<Decoded> = slots.into_iter().map(|s| s.into_inner().unwrap_or(None)).collect();
     if let Some((i, picture)) = begun {
-        all[i] = Some(picture.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+        let begun = picture.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        all[i] = begun.or_else(|| jobs[i].as_ref().ok().map(|bytes| decode(bytes)));
     }
     all
 }

@@ -58,7 +58,7 @@ pub(super) fn blend(frame: &Frame, bins: &[Bins], tile: usize, area: Area, scrat
 
 /// List the pixels where a triangle lies before everything opaque.
 #[inline(always)]
-fn gather(frame: &Frame, walk: &Walk, scratch: &mut TileScratch) {
+fn gather(frame: &Frame, walk: &Walk<8>, scratch: &mut TileScratch) {
     let TileScratch { seen, blend, .. } = scratch;
     seen.touch(walk.x, walk.y);
     let mask = &mut blend.mask;
@@ -82,10 +82,10 @@ struct Gather<'a> {
     samples: usize,
 }
 
-impl Visitor for Gather<'_> {
+impl Visitor<8> for Gather<'_> {
     #[inline(always)]
     fn see(&mut self, at: usize, inside: I8, z: F8) {
-        let pixels = lane_pixels(self.samples);
+        let pixels: I8 = lane_pixels(self.samples);
         for k in bits(inside.bitmask()) {
             let k = k as usize;
             // What lies exactly on an opaque surface, a decal, is before it.

@@ -4,6 +4,7 @@
 //! is as wide as the machine: sixteen points at once take half the instructions of twice eight.
 
 use super::TILE;
+use super::encode;
 use super::frame::{Draw, Frame};
 use super::resolve::{self, Shades};
 use super::scan::{self, Key};
@@ -29,6 +30,8 @@ pub(super) struct Clay<'a> {
     pub n: usize,
     /// The tile's first pixel, from the picture's centre.
     pub corner: [f32; 2],
+    /// Whether `out` takes codes.
+    pub coded: bool,
     pub out: &'a mut Shades,
 }
 
@@ -44,7 +47,7 @@ impl WideKernel for Clay<'_> {
 
     #[inline(always)]
     fn run<const N: usize>(self) {
-        let Self { frame, draw, id, known, keys, n, corner, out } = self;
+        let Self { frame, draw, id, known, keys, n, corner, coded, out } = self;
         let (scene, m) = (frame.scene, draw.material);
         let edges = Edges::new(known, corner, keys[0]);
         let t = draw.object.mesh.triangles[id as usize];
@@ -54,12 +57,7 @@ impl WideKernel for Clay<'_> {
             let uvs = corners(&draw.object.mesh.uvs[(map.uv_set & 1) as usize], t);
             (texture, uvs.map(|uv| map.transform.transform_point2(uv)))
         });
-        let [red, green, blue, alpha] = &mut out.0;
-        let rg = red.as_chunks_mut::<N>().0.iter_mut().zip(green.as_chunks_mut::<N>().0);
-        let ba = blue.as_chunks_mut::<N>().0.iter_mut().zip(alpha.as_chunks_mut::<N>().0);
-        for ((keys, (red, green)), (blue, alpha)) in
-            keys.as_chunks::<N>().0[..n.div_ceil(N)].iter().zip(rg).zip(ba)
-        {
+        for (i, keys) in keys.as_chunks::<N>().0[..n.div_ceil(N)].iter().enumerate() {
             let (b, scale) = edges.at(&I(*keys));
             let position = positions.at(&b);
             let mut k_d = V3::splat(m.diffuse.truncate());
@@ -79,7 +77,14 @@ impl WideKernel for Clay<'_> {
                 emissive: V3::splat(m.emissive),
             };
             let light = shade::shadowed(&s, V3::splat(scene.ambient), &frame.lamps, &[], true);
-            (*red, *green, *blue, *alpha) = (light.x.0, light.y.0, light.z.0, [1.0; N]);
+            let rgb = [light.x, light.y, light.z];
+            if coded {
+                out.codes.as_chunks_mut::<N>().0[i] = encode::encode_opaque(rgb).0;
+                continue;
+            }
+            for (plane, channel) in out.light.iter_mut().zip([rgb[0], rgb[1], rgb[2], F::ONE]) {
+                plane.as_chunks_mut::<N>().0[i] = channel.0;
+            }
         }
     }
 }

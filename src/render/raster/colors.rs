@@ -28,7 +28,7 @@ pub(super) enum Sink {
 /// Colours of a tile: row in the tile · 64 + column.
 #[derive(Debug, Default)]
 pub(super) struct Colors {
-    sink: Sink,
+    pub sink: Sink,
     /// Little-endian RGBA words.
     pub codes: Vec<u32>,
     /// Linear light: of all pixels, or of those that several evaluations share.
@@ -114,6 +114,15 @@ impl Colors {
             } else {
                 self.put_light(keys.0[k], rgba, k);
             }
+        }
+    }
+
+    /// Put codes of whole pixels.
+    #[inline(always)]
+    pub fn put_words(&mut self, keys: &[Key], words: &[i32]) {
+        let codes: &mut [u32; PLANE] = (&mut self.codes[..PLANE]).try_into().expect("a tile");
+        for (key, word) in keys.iter().zip(words) {
+            codes[scan::place(*key)] = *word as u32;
         }
     }
 

@@ -7,7 +7,7 @@ use super::frame::Frame;
 use super::resolve::Area;
 use super::{IdImage, TILE};
 use crate::image::{Image, Rgba8, color};
-use crate::math::simd::{F8, I8};
+use crate::math::simd::{F, F8, I, I8};
 use crate::render::channel::Channels;
 
 /// 64 rows of the output.
@@ -169,33 +169,39 @@ fn encode_row(row: &mut [u8], planes: &Planes, start: usize) {
 
 /// Eight pixels as [`color::encode_srgb8`] does it: the same bytes, faster.
 #[inline(always)]
-pub(super) fn encode8(mut c: [F8; 4]) -> I8 {
+pub(super) fn encode8(c: [F8; 4]) -> I8 {
     let opaque = c[3].ge(F8::ONE);
-    let mut alpha = I8::splat(255);
-    if !opaque.all() {
-        // Nothing is left of pixels of less than half an alpha code.
-        alpha = opaque.select_int(alpha, (c[3].clamp01() * 255.0 + 0.5).floor());
-        if !alpha.gt(I8::ZERO).any() {
-            return I8::ZERO;
-        }
-        let scale = opaque.select(F8::ONE, F8::ONE / c[3]);
-        c = [c[0] * scale, c[1] * scale, c[2] * scale, c[3]];
+    if opaque.all() {
+        return encode_opaque([c[0], c[1], c[2]]);
     }
-    let steps = &*color::STEPS;
-    let [r, g, b] = [codes(c[0], steps), codes(c[1], steps), codes(c[2], steps)];
-    alpha.gt(I8::ZERO) & (r | g.shift_left(8) | b.shift_left(16) | alpha.shift_left(24))
+    // Nothing is left of pixels of less than half an alpha code.
+    let alpha = opaque.select_int(I8::splat(255), (c[3].clamp01() * 255.0 + 0.5).floor());
+    if !alpha.gt(I8::ZERO).any() {
+        return I8::ZERO;
+    }
+    let scale = opaque.select(F8::ONE, F8::ONE / c[3]);
+    let color = encode_opaque([c[0] * scale, c[1] * scale, c[2] * scale]) & I8::splat(0xff_ffff);
+    alpha.gt(I8::ZERO) & (color | alpha.shift_left(24))
 }
 
-/// [`color::srgb8`] of eight.
+/// The same where all is opaque, of any number of pixels.
 #[inline(always)]
-fn codes(c: F8, steps: &[u32; 2048]) -> I8 {
-    let bits = c.max(F8::splat(color::DARK)).min(F8::ONE).to_bits();
-    let place = bits.shift_right(16) - I8::splat((color::DARK.to_bits() >> 16) as i32);
-    let mut code = I8::ZERO;
-    for k in 0..8 {
+pub(super) fn encode_opaque<const N: usize>(c: [F<N>; 3]) -> I<N> {
+    let steps = &*color::STEPS;
+    let [r, g, b] = [codes(c[0], steps), codes(c[1], steps), codes(c[2], steps)];
+    r | g.shift_left(8) | b.shift_left(16) | I::splat(255 << 24)
+}
+
+/// [`color::srgb8`] of each.
+#[inline(always)]
+fn codes<const N: usize>(c: F<N>, steps: &[u32; 2048]) -> I<N> {
+    let bits = c.max(F::splat(color::DARK)).min(F::ONE).to_bits();
+    let place = bits.shift_right(16) - I::splat((color::DARK.to_bits() >> 16) as i32);
+    let mut code = I::ZERO;
+    for k in 0..N {
         code.0[k] = steps[place.0[k] as usize & 2047] as i32;
     }
-    (code + (bits & I8::splat(0xffff))).shift_right(16)
+    (code + (bits & I::splat(0xffff))).shift_right(16)
 }
 
 #[cfg(test)]

@@ -1,12 +1,12 @@
 //! A triangle into a tile's visibility buffer.
 //!
 //! The samples of a pixel lie side by side, so that eight lanes are eight pixels of one sample or two pixels of four: small
-//! triangles then fill their lanes at four samples as well as at one.
+//! triangles then fill their lanes at four samples as well as at one. Machines with sixteen lanes see twice as many at a time.
 
 use super::TILE;
 use super::frame::{Frame, ROTATED};
 use super::setup::{Bounds, Fragment, Setup};
-use crate::math::simd::{F, F8, I, I8};
+use crate::math::simd::{F, I};
 
 /// Nothing is seen here.
 pub(super) const NONE: u32 = u32::MAX;
@@ -155,17 +155,17 @@ impl Visibility {
 }
 
 /// The part of a triangle within a tile, ready to be walked.
-pub(super) struct Walk {
+pub(super) struct Walk<const N: usize> {
     /// Pixels in the tile, first and last.
     pub x: [i32; 2],
     pub y: [i32; 2],
     /// Edge functions at the lanes that start at the tile's first pixel, in units of 256.
-    e: [I8; 3],
+    e: [I<N>; 3],
     /// Their steps along x and y, a pixel each.
     step_x: [i32; 3],
     step_y: [i32; 3],
     /// Depth at the same lanes, and its steps.
-    z: F8,
+    z: F<N>,
     z_x: f32,
     z_y: f32,
     /// At the first pixel's centre.
@@ -179,7 +179,7 @@ pub(super) struct Walk {
 /// corner to a sample, the two products differ by less than 1.7e9.
 const NEAR: u32 = 1 << 14;
 
-impl Walk {
+impl<const N: usize> Walk<N> {
     /// `None` where the triangle and the tile's samples do not meet.
     #[inline(always)]
     pub fn new(frame: &Frame, s: &Setup, tile: [i32; 2]) -> Option<Self> {
@@ -191,10 +191,10 @@ impl Walk {
         let mut walk = Self {
             x,
             y,
-            e: [I8::ZERO; 3],
+            e: [I::ZERO; 3],
             step_x: [0; 3],
             step_y: [0; 3],
-            z: F8::ZERO,
+            z: F::ZERO,
             z_x: 0.0,
             z_y: 0.0,
             z_center: 0.0,
@@ -225,9 +225,9 @@ impl Walk {
             let (dx, dy) = (s.x[b] - s.x[a], s.y[b] - s.y[a]);
             let bias = if dy < 0 || (dy == 0 && dx > 0) { 0 } else { -1 };
             (self.step_x[k], self.step_y[k]) = (-dy, dx);
-            let px = I8::splat(tile[0] * 256 + 128 - s.x[a]) + ox;
-            let py = I8::splat(tile[1] * 256 + 128 - s.y[a]) + oy;
-            self.e[k] = (I8::splat(dx) * py - I8::splat(dy) * px + I8::splat(bias)).shift_right(8);
+            let px = I::splat(tile[0] * 256 + 128 - s.x[a]) + ox;
+            let py = I::splat(tile[1] * 256 + 128 - s.y[a]) + oy;
+            self.e[k] = (I::splat(dx) * py - I::splat(dy) * px + I::splat(bias)).shift_right(8);
         }
     }
 
@@ -253,7 +253,7 @@ impl Walk {
             // Beyond ±2³⁰ the sign holds all over the tile.
             clamped[n] = e.clamp(-(1 << 30), 1 << 30) as i32;
         }
-        for l in 0..8 {
+        for l in 0..N {
             self.e[k].0[l] = clamped[l % frame.samples] + self.step_x[k] * (l / frame.samples) as i32;
         }
         best >= 0
@@ -278,34 +278,38 @@ impl Walk {
         if frame.samples == 4 {
             z = [at(ROTATED[0]), at(ROTATED[1]), at(ROTATED[2]), at(ROTATED[3])];
         }
-        let pixel = lane_pixels(frame.samples);
-        self.z = F([z[0], z[1], z[2], z[3], z[0], z[1], z[2], z[3]]) + pixel.to_f32() * self.z_x;
+        for l in 0..N {
+            self.z.0[l] = z[l % 4];
+        }
+        self.z = self.z + near_pixels(frame.samples).to_f32() * self.z_x;
     }
 
-    /// Visit every eight samples of which one is covered.
+    /// Visit all samples side by side, as many as lanes, of which one is covered.
     #[inline(always)]
-    pub fn visit(&self, samples: usize, visitor: &mut impl Visitor) {
-        let (lo, hi) = (F8::splat(self.z_lo), F8::splat(self.z_hi));
-        let wide = if samples == 1 { 8 } else { 2 };
-        // At one sample, what is at most eight pixels wide is walked in one column, wherever it starts.
-        let narrow = samples == 1 && self.x[1] - self.x[0] < 8;
-        let first = if narrow { self.x[0].min(TILE as i32 - 8) } else { self.x[0] & -wide };
-        let at = |k: usize| self.e[k] + I8::splat(self.step_x[k] * first + self.step_y[k] * self.y[0]);
+    pub fn visit(&self, samples: usize, visitor: &mut impl Visitor<N>) {
+        let (lo, hi) = (F::splat(self.z_lo), F::splat(self.z_hi));
+        let wide = (N / samples) as i32;
+        // At one sample, what is no wider than the lanes is walked in one column, wherever it starts.
+        let narrow = samples == 1 && self.x[1] - self.x[0] < wide;
+        let first = if narrow { self.x[0].min(TILE as i32 - wide) } else { self.x[0] & -wide };
+        let at = |k: usize| self.e[k] + I::splat(self.step_x[k] * first + self.step_y[k] * self.y[0]);
         let (mut e0, mut e1, mut e2) = (at(0), at(1), at(2));
-        let across = |k: usize| I8::splat(self.step_x[k] * wide);
+        let across = |k: usize| I::splat(self.step_x[k] * wide);
         let (across0, across1, across2) = (across(0), across(1), across(2));
-        let down = |k: usize| I8::splat(self.step_y[k]);
+        let down = |k: usize| I::splat(self.step_y[k]);
         let (down0, down1, down2) = (down(0), down(1), down(2));
         let steps = (self.x[1] - first) / wide + 1;
+        let x0 = (lane_pixels::<N>(samples) - near_pixels(samples) + I::splat(first)).to_f32();
+        let (z_x, wide_x) = (F::splat(self.z_x), F::splat(wide as f32));
         for y in self.y[0]..=self.y[1] {
             let (mut f0, mut f1, mut f2) = (e0, e1, e2);
-            let (mut at, mut x) = ((y * TILE as i32 + first) as usize * samples, first as f32);
-            let z_y = self.z_y * y as f32;
+            let (mut at, mut x) = ((y * TILE as i32 + first) as usize * samples, x0);
+            let z_y = F::splat(self.z_y * y as f32);
             let mut met = false;
             for _ in 0..steps {
                 let out = f0 | f1 | f2;
                 if !out.all() {
-                    let z = self.z + (self.z_x * x + z_y);
+                    let z = self.z + (z_x * x + z_y);
                     visitor.see(at, !out, z.max(lo).min(hi));
                     met = true;
                 } else if met && samples == 1 {
@@ -313,7 +317,7 @@ impl Walk {
                     break;
                 }
                 (f0, f1, f2) = (f0 + across0, f1 + across1, f2 + across2);
-                (at, x) = (at + 8, x + wide as f32);
+                (at, x) = (at + N, x + wide_x);
             }
             (e0, e1, e2) = (e0 + down0, e1 + down1, e2 + down2);
         }
@@ -321,20 +325,10 @@ impl Walk {
 
     /// Draw into the buffer: nearer wins, at equal depth the triangle that was submitted first.
     #[inline(always)]
-    pub fn fill(&self, samples: usize, v: &mut Visibility, keep: impl Keep) {
+    pub fn fill(&self, samples: usize, v: &mut Visibility, keep: impl Keep<N>) {
         v.touch(self.x, self.y);
         let (z, ids) = (&mut v.z[..], &mut v.id[..]);
-        if samples > 1 {
-            return self
-                .visit(samples, &mut Fill::<_, false> { z, ids, id: self.id, keep, places: &mut [], n: 0 });
-        }
-        let (start, places) = v.places.room(ids);
-        let mut fill = Fill::<_, true> { z, ids, id: self.id, keep, places, n: 0 };
-        self.visit(1, &mut fill);
-        if fill.n > 0 {
-            let end = (start + fill.n) as u32;
-            v.places.of.push((self.id, end));
-        }
+        self.visit(samples, &mut Fill::<_, false> { z, ids, id: self.id, keep, places: &mut [], n: 0 });
     }
 
     /// Depth at a pixel's centre in the tile.
@@ -343,25 +337,41 @@ impl Walk {
     }
 }
 
+impl Walk<8> {
+    /// The same at one sample a pixel, and list where it won.
+    #[inline(always)]
+    pub fn fill_and_list(&self, v: &mut Visibility, keep: impl Keep<8>) {
+        v.touch(self.x, self.y);
+        let (z, ids) = (&mut v.z[..], &mut v.id[..]);
+        let (start, places) = v.places.room(ids);
+        let mut fill = Fill::<_, true> { z, ids, id: self.id, keep, places, n: 0 };
+        self.visit(1, &mut fill);
+        if fill.n > 0 {
+            let end = (start + fill.n) as u32;
+            v.places.of.push((self.id, end));
+        }
+    }
+}
+
 /// What is done where a triangle is. A trait and no closure: what is not inlined loses its vector instructions, and only of
 /// functions can it be demanded.
-pub(super) trait Visitor {
-    /// Eight samples: place of the first, mask of those that are covered, depths.
-    fn see(&mut self, at: usize, inside: I8, z: F8);
+pub(super) trait Visitor<const N: usize> {
+    /// Samples side by side: place of the first, mask of those that are covered, depths.
+    fn see(&mut self, at: usize, inside: I<N>, z: F<N>);
 }
 
 /// Takes lanes away that would win.
-pub(super) trait Keep {
+pub(super) trait Keep<const N: usize> {
     /// Which of the samples from `at` on that would win do.
-    fn keep(&self, at: usize, wins: I8) -> I8;
+    fn keep(&self, at: usize, wins: I<N>) -> I<N>;
 }
 
 /// Everything that would win does.
 pub(super) struct All;
 
-impl Keep for All {
+impl<const N: usize> Keep<N> for All {
     #[inline(always)]
-    fn keep(&self, _: usize, wins: I8) -> I8 {
+    fn keep(&self, _: usize, wins: I<N>) -> I<N> {
         wins
     }
 }
@@ -376,26 +386,20 @@ struct Fill<'a, K, const LIST: bool> {
     n: usize,
 }
 
-impl<K: Keep, const LIST: bool> Visitor for Fill<'_, K, LIST> {
+impl<const N: usize, K: Keep<N>, const LIST: bool> Visitor<N> for Fill<'_, K, LIST> {
     #[inline(always)]
-    fn see(&mut self, at: usize, inside: I8, z: F8) {
-        let zs: &mut [f32; 8] = (&mut self.z[at..at + 8]).try_into().expect("eight");
-        let ids: &mut [u32; 8] = (&mut self.ids[at..at + 8]).try_into().expect("eight");
-        let id = I8::splat(self.id as i32);
-        let (old_z, mut old_id) = (F(*zs), I8::ZERO);
-        for k in 0..8 {
-            old_id.0[k] = ids[k] as i32;
-        }
+    fn see(&mut self, at: usize, inside: I<N>, z: F<N>) {
+        let zs: &mut [f32; N] = (&mut self.z[at..at + N]).try_into().expect("as many as lanes");
+        let ids: &mut [u32; N] = (&mut self.ids[at..at + N]).try_into().expect("as many as lanes");
+        let id = I::splat(self.id as i32);
+        let (old_z, old_id) = (F(*zs), I(ids.map(|id| id as i32)));
         let wins = inside & (z.gt(old_z) | (z.equal(old_z) & before(id, old_id)));
         if !wins.any() {
             return;
         }
         let wins = self.keep.keep(at, wins);
         *zs = wins.select(z, old_z).0;
-        let new = wins.select_int(id, old_id);
-        for k in 0..8 {
-            ids[k] = new.0[k] as u32;
-        }
+        *ids = wins.select_int(id, old_id).0.map(|id| id as u32);
         if LIST {
             if let Some(place) = self.places.get_mut(self.n) {
                 *place = at as u16;
@@ -407,28 +411,35 @@ impl<K: Keep, const LIST: bool> Visitor for Fill<'_, K, LIST> {
 
 /// Unsigned `a < b`.
 #[inline(always)]
-fn before(a: I8, b: I8) -> I8 {
-    let flip = I8::splat(i32::MIN);
+fn before<const N: usize>(a: I<N>, b: I<N>) -> I<N> {
+    let flip = I::splat(i32::MIN);
     (b + flip).gt(a + flip)
 }
 
 /// The pixel of each lane, from the first.
 #[inline(always)]
-pub(super) fn lane_pixels(samples: usize) -> I8 {
-    if samples == 1 { I8::IOTA } else { I([0, 0, 0, 0, 1, 1, 1, 1]) }
+pub(super) fn lane_pixels<const N: usize>(samples: usize) -> I<N> {
+    if samples == 1 { I::IOTA } else { I::IOTA.shift_right(2) }
+}
+
+/// The pixel of each lane within the eight that it belongs to: depths are rounded alike, however many eights there are.
+#[inline(always)]
+fn near_pixels<const N: usize>(samples: usize) -> I<N> {
+    if samples == 1 { I::IOTA } else { I::IOTA.shift_right(2) & I::splat(1) }
 }
 
 /// Where each lane's sample lies, in 1/256 pixels from the first pixel's centre.
 #[inline(always)]
-pub(super) fn lane_offsets(samples: usize) -> [I8; 2] {
+pub(super) fn lane_offsets<const N: usize>(samples: usize) -> [I<N>; 2] {
     if samples == 1 {
-        return [I8::IOTA.shift_left(8), I8::ZERO];
+        return [I::IOTA.shift_left(8), I::ZERO];
     }
-    const R: [[i32; 2]; 4] = ROTATED;
-    [
-        I([R[0][0], R[1][0], R[2][0], R[3][0], 256 + R[0][0], 256 + R[1][0], 256 + R[2][0], 256 + R[3][0]]),
-        I([R[0][1], R[1][1], R[2][1], R[3][1], R[0][1], R[1][1], R[2][1], R[3][1]]),
-    ]
+    let mut offsets = [I::IOTA.shift_right(2).shift_left(8), I::ZERO];
+    for l in 0..N {
+        offsets[0].0[l] += ROTATED[l % 4][0];
+        offsets[1].0[l] = ROTATED[l % 4][1];
+    }
+    offsets
 }
 
 #[inline(always)]

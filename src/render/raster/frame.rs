@@ -1,6 +1,7 @@
 //! What every stage reads: the picture's geometry and the objects that can be drawn.
 
 use super::Stats;
+use super::setup::Setup;
 use crate::math::simd::{F8, Isa, V8};
 use crate::render::Settings;
 use crate::render::shade::Lamp;
@@ -58,6 +59,8 @@ pub(super) struct Frame<'a> {
     pub samples: usize,
     pub vertex_count: usize,
     pub triangle_count: u32,
+    /// Whether a draw is masked.
+    pub masks: bool,
     /// How much depth may differ within a smooth surface and a pixel.
     pub depth_step: [f32; 2],
     pub stats: Stats,
@@ -94,6 +97,7 @@ impl<'a> Frame<'a> {
             samples: settings.samples as usize,
             vertex_count: 0,
             triangle_count: 0,
+            masks: false,
             depth_step: super::merge::depth_step(h, &scene.camera),
             stats: Stats::default(),
             lamps: scene.lights.iter().map(Lamp::from).collect(),
@@ -139,6 +143,7 @@ impl<'a> Frame<'a> {
                 && self.scene.style.is_plain(),
             skin,
         });
+        self.masks |= matches!(material.alpha, AlphaMode::Mask(_));
         self.triangle_count = end as u32;
         self.vertex_count += v;
         self.stats.vertices += v as u64;
@@ -147,6 +152,12 @@ impl<'a> Frame<'a> {
     /// Which draw a triangle belongs to.
     pub fn draw_of(&self, id: u32) -> usize {
         self.draws.partition_point(|d| d.first_triangle <= id) - 1
+    }
+
+    /// Whether a triangle is of a masked draw.
+    #[inline(always)]
+    pub fn is_masked(&self, setup: &Setup) -> bool {
+        self.masks && self.draws[setup.draw as usize].class == Class::Mask
     }
 
     /// Distance along the view direction at a depth value.

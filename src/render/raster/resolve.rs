@@ -42,14 +42,17 @@ impl Area {
     }
 }
 
-/// Colours of as many batches, a plane a channel.
+/// Colours of as many batches: light, a plane a channel, or codes.
 #[derive(Debug)]
 #[repr(align(64))]
-pub(super) struct Shades(pub [[f32; 8 * BATCHES]; 4]);
+pub(super) struct Shades {
+    pub light: [[f32; 8 * BATCHES]; 4],
+    pub codes: [i32; 8 * BATCHES],
+}
 
 impl Default for Shades {
     fn default() -> Self {
-        Self([[0.0; 8 * BATCHES]; 4])
+        Self { light: [[0.0; 8 * BATCHES]; 4], codes: [0; 8 * BATCHES] }
     }
 }
 
@@ -57,7 +60,7 @@ impl Shades {
     /// Eight of them.
     #[inline(always)]
     pub fn batch(&self, i: usize) -> [F8; 4] {
-        let c = &self.0;
+        let c = &self.light;
         [
             F8::load(&c[0][8 * i..]),
             F8::load(&c[1][8 * i..]),
@@ -69,7 +72,7 @@ impl Shades {
     #[inline(always)]
     pub fn set(&mut self, i: usize, rgba: &[F8; 4]) {
         for c in 0..4 {
-            rgba[c].store(&mut self.0[c][8 * i..]);
+            rgba[c].store(&mut self.light[c][8 * i..]);
         }
     }
 }
@@ -120,9 +123,15 @@ fn chain(frame: &Frame, area: Area, k: usize, scratch: &mut TileScratch) {
             for k in left..keys.len() {
                 keys[k] = keys[0];
             }
+            done += n as u32;
             if draw.clay {
                 let (id, known, out) = (ids[0][0], &known, &mut *shades);
-                Clay { frame, draw, id, known, keys, n, corner, out }.colors();
+                let coded = colors.sink == Sink::Codes && scan::are_whole(keys);
+                Clay { frame, draw, id, known, keys, n, corner, coded, out }.colors();
+                if coded {
+                    colors.put_words(&keys[..n], &shades.codes);
+                    continue;
+                }
             } else {
                 let keys = &keys.as_chunks::<8>().0[..n.div_ceil(8)];
                 let (ids, known, found, out) = (&ids, &known, &mut [], &mut *shades);
@@ -131,7 +140,6 @@ fn chain(frame: &Frame, area: Area, k: usize, scratch: &mut TileScratch) {
             for (i, keys) in keys.as_chunks::<8>().0[..n.div_ceil(8)].iter().enumerate() {
                 colors.put(&I(*keys), (n - 8 * i).min(8), &shades.batch(i));
             }
-            done += n as u32;
         }
         stats.shaded += done as u64;
     }
@@ -341,7 +349,7 @@ pub(super) fn shade_list(
         rest[..n].iter().for_each(|l| waiting.push(key(l.place as usize, l.mask as u32), l.id));
         waiting.colors(frame, draw, area);
         for k in 0..n {
-            let c = &waiting.rgba.0;
+            let c = &waiting.rgba.light;
             out.push([c[0][k], c[1][k], c[2][k], c[3][k]]);
         }
         rest = &rest[n..];

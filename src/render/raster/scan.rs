@@ -33,6 +33,12 @@ pub(super) fn covers(key: Key) -> u32 {
     key as u32 >> 12 & WHOLE
 }
 
+/// Whether they take all samples.
+#[inline(always)]
+pub(super) fn are_whole(keys: &[Key]) -> bool {
+    keys.iter().fold(-1, |all, key| all & *key) as u32 >> 12 & WHOLE == WHOLE
+}
+
 /// Evaluations of one triangle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Chain {

@@ -116,6 +116,12 @@ impl Bins {
         s.drawn = (end - start) as u64 - s.skipped - s.culled - s.missed;
     }
 
+    /// Triangles of a tile that are opaque or masked.
+    #[inline(always)]
+    pub fn solid(&self, tile: usize) -> impl Iterator<Item = &Setup> {
+        self.tiles[tile].solid.iter().map(|&s| &self.setups[s as usize])
+    }
+
     fn clear(&mut self, tiles: usize) {
         self.stats = Stats::default();
         self.setups.clear();

@@ -4,13 +4,13 @@ use super::blend::{self, BlendScratch};
 use super::colors::{Colors, Sink};
 use super::encode::Target;
 use super::fill::{All, Keep, Visibility, Walk, lane_offsets};
-use super::frame::{Class, Draw, Frame};
+use super::frame::{Draw, Frame};
 use super::resolve::{self, Area, LastDraw, Shades};
 use super::scan::Entries;
 use super::setup::Bins;
 use super::surface::Present;
 use super::{Stats, TILE};
-use crate::math::simd::{I8, Kernel};
+use crate::math::simd::{self, I8, Kernel, WideKernel};
 use crate::render::Window;
 
 /// Working memory of one thread.
@@ -68,9 +68,15 @@ impl Row<'_, '_> {
         // What is visible at each sample?
         let area = Area { origin: [x as i32, (self.row * TILE) as i32], to, w, h: self.target.rows() };
         self.scratch.seen.start(frame.samples);
+        let opaque = Opaque { frame, bins: self.bins, index, area, seen: &mut self.scratch.seen };
+        if frame.samples == 1 {
+            opaque.fill_and_list();
+        } else {
+            simd::run_wide(frame.isa, opaque);
+        }
         for bins in self.bins {
-            for &s in &bins.tiles[index].solid {
-                self.solid(bins, s, area);
+            if frame.masks {
+                self.masked(bins, index, area);
             }
             self.scratch.seen.put(&bins.tiles[index].fragments);
         }
@@ -91,18 +97,68 @@ impl Row<'_, '_> {
         self.target.write_planes(to, w, &self.scratch.colors.planes);
     }
 
-    /// An opaque or masked triangle into the buffer.
+    /// Masked triangles into the buffer.
     #[inline(always)]
-    fn solid(&mut self, bins: &Bins, s: u32, area: Area) {
-        let frame = self.frame;
-        let setup = &bins.setups[s as usize];
-        let Some(walk) = Walk::new(frame, setup, area.origin) else { return };
-        let draw = &frame.draws[setup.draw as usize];
-        if draw.class == Class::Opaque {
-            return walk.fill(frame.samples, &mut self.scratch.seen, All);
+    fn masked(&mut self, bins: &Bins, index: usize, area: Area) {
+        let (frame, seen) = (self.frame, &mut self.scratch.seen);
+        for setup in bins.solid(index) {
+            if frame.is_masked(setup)
+                && let Some(walk) = Walk::new(frame, setup, area.origin)
+            {
+                let draw = &frame.draws[setup.draw as usize];
+                let id = setup.id - draw.first_triangle;
+                let keep = Textured { frame, draw, id, corner: area.corner(frame) };
+                match frame.samples {
+                    1 => walk.fill_and_list(seen, keep),
+                    n => walk.fill(n, seen, keep),
+                }
+            }
         }
-        let keep = Textured { frame, draw, id: setup.id - draw.first_triangle, corner: area.corner(frame) };
-        walk.fill(frame.samples, &mut self.scratch.seen, keep);
+    }
+}
+
+/// Opaque triangles of a tile into the buffer.
+struct Opaque<'a> {
+    frame: &'a Frame<'a>,
+    bins: &'a [Bins],
+    index: usize,
+    area: Area,
+    seen: &'a mut Visibility,
+}
+
+impl Opaque<'_> {
+    /// One sample a pixel: few triangles are wider than eight.
+    #[inline(always)]
+    fn fill_and_list(self) {
+        let Self { frame, bins, index, area, seen } = self;
+        for bins in bins {
+            for setup in bins.solid(index) {
+                if !frame.is_masked(setup)
+                    && let Some(walk) = Walk::new(frame, setup, area.origin)
+                {
+                    walk.fill_and_list(seen, All);
+                }
+            }
+        }
+    }
+}
+
+/// Four samples a pixel.
+impl WideKernel for Opaque<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<const N: usize>(self) {
+        let Self { frame, bins, index, area, seen } = self;
+        for bins in bins {
+            for setup in bins.solid(index) {
+                if !frame.is_masked(setup)
+                    && let Some(walk) = Walk::<N>::new(frame, setup, area.origin)
+                {
+                    walk.fill(4, seen, All);
+                }
+            }
+        }
     }
 }
 
@@ -114,12 +170,12 @@ struct Textured<'a> {
     corner: [f32; 2],
 }
 
-impl Keep for Textured<'_> {
+impl Keep<8> for Textured<'_> {
     #[inline(always)]
     fn keep(&self, at: usize, wins: I8) -> I8 {
         let Self { frame, draw, id, corner } = *self;
         let place = at / frame.samples;
-        let [ox, oy] = lane_offsets(frame.samples).map(|o| o.to_f32() * (1.0 / 256.0));
+        let [ox, oy] = lane_offsets::<8>(frame.samples).map(|o| o.to_f32() * (1.0 / 256.0));
         let px = ox + (corner[0] + (place % TILE) as f32);
         let py = oy + (corner[1] + (place / TILE) as f32);
         wins & Present { frame, draw, id, px, py }.mask()

@@ -39,6 +39,7 @@ impl Vertices {
                 tasks.push(Transform { frame, positions, xy: xy_task, z: z_task });
             }
         }
+        let threads = threads.min(tasks.len());
         if threads <= 1 {
             return tasks.into_iter().for_each(|t| simd::run(isa, t));
         }
