@@ -1,16 +1,16 @@
 //! Whole processes side by side: ours and any peer's, taking turns in one run.
 //!
 //! ```text
-//! cargo bench --bench film -- man.glb 48 'filly=python filly_frames.py man.glb 48 /tmp/out' 'f3d=python f3d_frames.py …'
+//! cargo bench --bench film -- man.glb 48 'filly=python filly_frames.py man.glb 48 {out}' 'f3d=python f3d_frames.py …'
 //! ```
 //!
-//! Each round runs every command once, so a machine that slows down slows all of them. Printed are medians of wall and
-//! processor time over all rounds, the largest resident set of one more run, and the ratios to ours.
+//! Each round runs every command once, so a machine that slows down slows all of them; `{out}` is an empty folder each time. Printed are
+//! medians of wall and processor time over all rounds, the largest resident set of one more run, and the ratios to ours.
 
 mod process;
 
 use process::run;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const ROUNDS: usize = 9;
@@ -18,6 +18,8 @@ const ROUNDS: usize = 9;
 struct Entry {
     name: String,
     words: Vec<String>,
+    /// Where its pictures go.
+    out: PathBuf,
     wall: Vec<f64>,
     cpu: Vec<f64>,
 }
@@ -29,10 +31,14 @@ fn main() {
         return;
     };
     let out = std::env::temp_dir().join(format!("sinew-bench-{}", std::process::id()));
-    let mut entries = vec![ours(asset, frames, &out)];
-    entries.extend(peers.iter().map(|p| entry(p)));
+    let ours = format!(
+        "sinew={} render {asset} -o {{out}}/f.####.png --frames 1-{frames} -q",
+        env!("CARGO_BIN_EXE_sinew")
+    );
+    let mut entries: Vec<Entry> = std::iter::once(&ours).chain(peers).map(|e| entry(e, &out)).collect();
     for round in 0..=ROUNDS {
         for e in &mut entries {
+            empty(&e.out);
             let (wall, cpu) = run(&e.words);
             // The first round warms caches.
             if round > 0 {
@@ -45,17 +51,18 @@ fn main() {
     std::fs::remove_dir_all(&out).ok();
 }
 
-fn ours(asset: &str, frames: &str, out: &Path) -> Entry {
-    let pattern = out.join("f.####.png").display().to_string();
-    let set = format!("1-{frames}");
-    let words = [env!("CARGO_BIN_EXE_sinew"), "render", asset, "-o", &pattern, "--frames", &set, "-f", "-q"];
-    Entry { name: "sinew".into(), words: words.map(String::from).to_vec(), wall: vec![], cpu: vec![] }
+fn entry(text: &str, out: &Path) -> Entry {
+    let (name, command) = text.split_once('=').expect("a peer is NAME=COMMAND");
+    let out = out.join(name);
+    let folder = out.display().to_string();
+    let words = command.split_whitespace().map(|w| w.replace("{out}", &folder)).collect();
+    Entry { name: name.into(), words, out, wall: vec![], cpu: vec![] }
 }
 
-fn entry(text: &str) -> Entry {
-    let (name, command) = text.split_once('=').expect("a peer is NAME=COMMAND");
-    let words = command.split_whitespace().map(String::from).collect();
-    Entry { name: name.into(), words, wall: vec![], cpu: vec![] }
+/// A folder with nothing in it: to replace files takes longer than to make them.
+fn empty(folder: &Path) {
+    std::fs::remove_dir_all(folder).ok();
+    std::fs::create_dir_all(folder).expect("a folder for pictures");
 }
 
 /// Megabytes of the largest resident set, by GNU time where it is installed.
@@ -77,6 +84,7 @@ fn report(entries: &mut [Entry]) {
         if i == 0 {
             first = (wall, cpu);
         }
+        empty(&e.out);
         let peak = peak(&e.words).map_or("?".into(), |m| format!("{m:.0}"));
         let (rw, rc) = (wall / first.0, cpu / first.1);
         println!("{:10} {wall:9.3} {cpu:9.3} {peak:>9} {rw:8.1} {rc:8.1}", e.name);
