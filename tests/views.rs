@@ -2,8 +2,8 @@
 
 use glam::{DVec3, Vec3};
 use sinew::frames::{
-    BonesDesc, FramingDesc, Look, Moment, Onion, Overlays, PathDesc, Pivot, Shot, ShotDesc, Turns, View,
-    ViewError, Worker,
+    BonesDesc, Foresight, FramingDesc, Look, Moment, Onion, Overlays, PathDesc, Pivot, Shot, ShotDesc, Turns,
+    View, ViewError, Worker,
 };
 use sinew::image::composite::Operator;
 use sinew::image::{Image, Rgba8};
@@ -69,6 +69,29 @@ fn free(shot: &Shot, moments: impl IntoIterator<Item = Moment>) -> usize {
 fn check_margin(what: &str, free: usize) {
     let margin = SIDE * 4 / 100;
     assert!((margin - 1..=margin + 2).contains(&free), "{what}: {free} pixels are free, {margin} asked for");
+}
+
+#[test]
+fn what_was_foreseen_changes_no_picture() {
+    let import = rig("pip");
+    let (clip, view, framing) = (Some(0), View::default(), FramingDesc::default());
+    let foresee = |clip, view: &View, framing| Foresight::new(&import.asset, clip, view, framing, 1.0);
+    let seen = foresee(clip, &view, &framing).expect("an orbit can be foreseen");
+    let elsewhere = View::Orbit { yaw: 2.0, pitch: 0.1, fov_y: 0.3 };
+    let wrong = [foresee(None, &view, &framing), foresee(clip, &elsewhere, &framing)];
+    for desc in [desc(), ShotDesc { view: elsewhere, ..desc() }, ShotDesc { clip: None, ..desc() }] {
+        let plain = picture(&shot(&import, desc.clone()), 0.2);
+        for foresight in wrong.iter().flatten().chain([&seen]) {
+            let foreseen = Shot::foreseen(&import.asset, desc.clone(), Some(foresight)).unwrap();
+            assert!(picture(&foreseen, 0.2) == plain);
+        }
+    }
+    // Cameras that move, turn or have a place of their own are left to the shot.
+    let look_at = View::LookAt { eye: DVec3::Z, target: DVec3::ZERO, up: Vec3::Y, fov_y: 0.5 };
+    let turning = FramingDesc { turns: Turns::All, ..framing };
+    let each = FramingDesc { each_frame: true, ..framing };
+    assert!(foresee(clip, &look_at, &framing).is_none() && foresee(clip, &view, &turning).is_none());
+    assert!(foresee(clip, &view, &each).is_none());
 }
 
 #[test]

@@ -176,8 +176,18 @@ fn print(bytes: &[u8]) -> Result<(), Failure> {
 
 /// Read the input, show its warnings.
 fn load(path: &Path, options: Options, say: &Say) -> Result<Import, Failure> {
-    let import =
-        io::import(path, &options).map_err(|e| Failure::Input(format!("{}: {e}", path.display())))?;
+    load_while(path, options, say, &mut |_| ())
+}
+
+/// The same, with something to do while pictures are decoded.
+fn load_while(
+    path: &Path,
+    options: Options,
+    say: &Say,
+    meanwhile: &mut dyn FnMut(&Import),
+) -> Result<Import, Failure> {
+    let import = io::import_while(path, &options, meanwhile)
+        .map_err(|e| Failure::Input(format!("{}: {e}", path.display())))?;
     say.warnings(path, &import.warnings);
     Ok(import)
 }

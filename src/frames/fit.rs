@@ -1,5 +1,6 @@
 //! Which points a framing must hold: all vertices, over the whole clip.
 
+use super::foresight::Foresight;
 use super::framing::Framing;
 use super::worker::Worker;
 use crate::asset::Asset;
@@ -17,6 +18,8 @@ pub(super) struct Span<'a> {
     pub center: DVec3,
     /// A box around the shapes in it, as far as they end.
     pub shapes: Option<[Vec3; 2]>,
+    /// What was seen of it before.
+    pub foresight: Option<&'a Foresight>,
 }
 
 impl Span<'_> {
@@ -105,7 +108,7 @@ pub(super) fn each_moment<S: Sight>(
 }
 
 /// Show what there is at some moments.
-fn look(
+pub(super) fn look(
     span: &Span,
     anchor: Option<(BoneId, DVec3)>,
     worker: &mut Worker,

@@ -4,6 +4,7 @@ mod bones;
 mod channels;
 mod effects;
 mod fit;
+mod foresight;
 mod framing;
 mod live;
 mod look;
@@ -18,6 +19,7 @@ mod view;
 mod worker;
 
 pub use channels::Extent;
+pub use foresight::Foresight;
 pub use framing::{Framing, Turns};
 pub use live::Live;
 pub use look::{GroundLook, Look, Shading, Shadows};
@@ -193,6 +195,21 @@ impl<'a> Shot<'a> {
     /// # Panics
     /// If the asset has no such clip.
     pub fn new(asset: &'a Asset, desc: ShotDesc) -> Result<Self, ViewError> {
+        Self::foreseen(asset, desc, None)
+    }
+
+    /// The same with what was found beforehand.
+    ///
+    /// # Errors
+    /// Those of [`Shot::new`].
+    ///
+    /// # Panics
+    /// As [`Shot::new`].
+    pub fn foreseen(
+        asset: &'a Asset,
+        desc: ShotDesc,
+        foresight: Option<&'a Foresight>,
+    ) -> Result<Self, ViewError> {
         let mut materials = look::materials(asset, &desc.look);
         let own = materials.len();
         materials.extend(desc.props.materials.iter().cloned());
@@ -203,7 +220,7 @@ impl<'a> Shot<'a> {
         let center = asset.character.center(&worker.posed);
         let placed = |s: &Shape| Shape { geometry: s.geometry.moved(-center), material: own + s.material };
         let shapes: Vec<Shape> = desc.props.shapes.iter().map(placed).collect();
-        let span = Span { asset, clip: desc.clip, center, shapes: Shape::bounds(&shapes) };
+        let span = Span { asset, clip: desc.clip, center, shapes: Shape::bounds(&shapes), foresight };
         let stand = Stand::new(&span, &desc.view, desc.framing, aspect, &mut worker)?;
         let stage = Stage::new(&span, &desc.look, &materials, &mut worker);
         let layers = Layers::new(&span, &desc.overlays, &mut worker)?;

@@ -51,7 +51,8 @@ impl<'a> Stand<'a> {
         let local = |p: DVec3| (p - center).as_vec3();
         let mut fitted = |axes: Mat3A, fov_y: f32| {
             let f = Framing::along(axes, fov_y, aspect, framing.fill()).turning(framing.turns, axis);
-            fit::each_moment(span, anchor, worker, f)
+            let seen = span.foresight.filter(|_| anchor.is_none()).and_then(|s| s.of(span, &f));
+            seen.unwrap_or_else(|| fit::each_moment(span, anchor, worker, f))
         };
         let base = match *view {
             View::Orbit { yaw, pitch, fov_y } => {

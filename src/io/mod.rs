@@ -134,12 +134,31 @@ pub enum ImportError {
 /// [`ImportError`]; the caller knows which file it named, the message says where in it.
 #[cfg(feature = "io")]
 pub fn import(path: &std::path::Path, options: &Options) -> Result<Import, ImportError> {
-    read_import(path, options, true)
+    import_while(path, options, &mut |_| ())
 }
 
-/// [`import`], `scenes` among them or not.
+/// [`import`], with something to do while pictures are decoded: `meanwhile` is shown the import as soon as all but its materials and
+/// textures is there, if they take long; else it is not called.
+///
+/// # Errors
+/// Those of [`import`].
 #[cfg(feature = "io")]
-fn read_import(path: &std::path::Path, options: &Options, scenes: bool) -> Result<Import, ImportError> {
+pub fn import_while(
+    path: &std::path::Path,
+    options: &Options,
+    meanwhile: &mut dyn FnMut(&Import),
+) -> Result<Import, ImportError> {
+    read_import(path, options, true, meanwhile)
+}
+
+/// [`import_while`], `scenes` among them or not.
+#[cfg(feature = "io")]
+fn read_import(
+    path: &std::path::Path,
+    options: &Options,
+    scenes: bool,
+    meanwhile: &mut dyn FnMut(&Import),
+) -> Result<Import, ImportError> {
     let bytes = read_file(path)?;
     let folder = path.parent().unwrap_or(std::path::Path::new(""));
     let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -151,7 +170,7 @@ fn read_import(path: &std::path::Path, options: &Options, scenes: bool) -> Resul
         Format::Notes => Ok(notes::import_bytes(&bytes, folder, options)?),
         Format::Gltf => {
             let folder = if folder.as_os_str().is_empty() { std::path::Path::new(".") } else { folder };
-            Ok(gltf::import_bytes(&bytes, Some(folder), &path.display().to_string(), options)?)
+            Ok(gltf::import_while(&bytes, Some(folder), &path.display().to_string(), options, meanwhile)?)
         }
         Format::Rig => Ok(rig_json::import(path, options)?),
         Format::NotesScene | Format::Scene if !scenes => {

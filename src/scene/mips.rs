@@ -61,8 +61,8 @@ fn half_srgb(content: Content, from: &[u8], w: usize, h: usize) -> Vec<u8> {
     }
 }
 
-/// Bytes of a level that are worth a thread.
-const PARALLEL: usize = 2 << 20;
+/// Bytes of a level from which on two threads are worth their start; larger ones get one for each two of these.
+const PARALLEL: usize = 1 << 20;
 
 /// Threads at most: asking how many processors there are would take as long as a tenth of a level.
 const WORKERS: usize = 8;
@@ -71,7 +71,10 @@ const WORKERS: usize = 8;
 /// `None` where a texel is not opaque.
 fn half_opaque(from: &[u8], w: usize) -> Option<Vec<u8>> {
     let mut out = vec![0; from.len() / 4];
-    let workers = (from.len() / PARALLEL).clamp(1, WORKERS);
+    let workers = match from.len() {
+        0..PARALLEL => 1,
+        bytes => (bytes / PARALLEL / 2).clamp(2, WORKERS),
+    };
     // Bands of rows, the first on this thread; each texel is made once, so their number changes nothing.
     let rows = (from.len() / (8 * w)).div_ceil(workers).max(1);
     let opaque = std::thread::scope(|scope| {

@@ -3,9 +3,10 @@
 use super::film::Written;
 use super::stats::{Form, Totals};
 use super::time::Frame;
-use super::{Args, Plan, Task, draw, list, plan};
+use super::{Args, Plan, Task, draw, list, plan, scene, usual_size};
 use crate::cli::batch::{self, Names, Outcome};
-use crate::cli::{Failure, load_posed, print, say, say::Say};
+use crate::cli::{Failure, load_posed, load_while, print, say, say::Say};
+use sinew::frames::Foresight;
 use sinew::io::manifest::{self, Failed, FileEntry, FrameEntry, Manifest, Output};
 use sinew::io::picture::{AtomicFile, Folder, Target};
 use sinew::io::{Import, Options};
@@ -62,6 +63,19 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     batch.run()
 }
 
+/// What the camera of the one shot of an import will have to hold, if that can be told so early.
+fn foresee(args: &Args, import: &Import) -> Option<Foresight> {
+    if args.batch.all_clips {
+        return None;
+    }
+    let asset = &import.asset;
+    let clip = args.time.clip(import).ok()?;
+    let view = args.sheet.view(args.camera.view(asset, scene(import)).ok()?, args.camera.is_default());
+    let settings = args.output.settings(usual_size(import), args.renderer.coverage()).ok()?;
+    let aspect = settings.width as f32 / settings.height as f32;
+    Foresight::new(asset, clip, &view, &args.camera.framing(asset).ok()?, aspect)
+}
+
 impl<'a> Batch<'a> {
     /// Find what is wrong with the arguments before anything is read.
     fn new(args: &'a Args, say: &'a Say) -> Result<Self, Failure> {
@@ -111,7 +125,13 @@ impl<'a> Batch<'a> {
         }
         let textures = !self.args.batch.dry_run;
         let start = Instant::now();
-        let import = load_posed(input, self.args.time.poses.as_ref(), Options { textures }, self.say)?;
+        let mut foresight = None;
+        let import = match &self.args.time.poses {
+            None => {
+                load_while(input, Options { textures }, self.say, &mut |i| foresight = foresee(self.args, i))?
+            }
+            poses => load_posed(input, poses.as_ref(), Options { textures }, self.say)?,
+        };
         self.totals.import += start.elapsed();
         let clips = import.asset.character.clips();
         let wanted: Vec<Option<usize>> = match self.args.batch.all_clips {
@@ -120,7 +140,7 @@ impl<'a> Batch<'a> {
             false => vec![self.args.time.clip(&import)?],
         };
         for clip in wanted {
-            if let Err(failure) = self.clip(input, &import, clip) {
+            if let Err(failure) = self.clip(input, &import, foresight.as_ref(), clip) {
                 self.fail(input, failure)?;
             }
         }
@@ -158,14 +178,20 @@ impl<'a> Batch<'a> {
         self.args.output.target(&self.names.fill(input, clip, index))
     }
 
-    fn clip(&mut self, input: &Path, import: &Import, clip: Option<usize>) -> Result<(), Failure> {
+    fn clip(
+        &mut self,
+        input: &Path,
+        import: &Import,
+        foresight: Option<&Foresight>,
+        clip: Option<usize>,
+    ) -> Result<(), Failure> {
         let clip_name = clip.map(|c| import.asset.character.clips()[c].name.clone());
         let target = self.target(input, clip_name.as_deref().unwrap_or("rest"), clip.unwrap_or(0))?;
         self.claim(input, &clip_name, &target)?;
         target.path_of(1).map_or(Ok(()), |path| keep_inputs(self.args, &path))?;
         let companions = self.args.sheet.companions(&target);
         companions.iter().try_for_each(|p| keep_inputs(self.args, p))?;
-        let task = Task { input, import, clip, target: &target };
+        let task = Task { input, import, foresight, clip, target: &target };
         let mut plan = plan(self.args, &task)?;
         self.take_share(&target, &mut plan.frames);
         self.keep_manifest(

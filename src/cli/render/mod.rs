@@ -18,7 +18,7 @@ use super::{Failure, print, say, say::Say};
 use channels::Beside;
 use film::{Job, Written};
 use sinew::asset::Asset;
-use sinew::frames::{Look, Props, Shot, ShotDesc};
+use sinew::frames::{Foresight, Look, Props, Shot, ShotDesc};
 use sinew::io::Import;
 use sinew::io::picture::{Format, Target};
 use sinew::io::scene::{Setting, ours::SceneFile};
@@ -91,6 +91,7 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
 struct Task<'a> {
     input: &'a Path,
     import: &'a Import,
+    foresight: Option<&'a Foresight>,
     clip: Option<usize>,
     target: &'a Target,
 }
@@ -208,7 +209,7 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
     let start = Instant::now();
     let desc = args.sheet.desc(desc, asset);
     let of_file = args.camera.is_default() && scene.is_some_and(|s| s.camera.is_some());
-    let shot = Shot::new(asset, desc).map_err(|e| match of_file {
+    let shot = Shot::foreseen(asset, desc, task.foresight).map_err(|e| match of_file {
         true => Failure::Input(format!("{}: camera: {e}", task.input.display())),
         false => Failure::Usage(e.to_string()),
     })?;

@@ -49,6 +49,7 @@ use crate::asset::Asset;
 use crate::character::Character;
 use document::Document;
 use error::Result;
+use std::mem::take;
 use std::path::Path;
 use warnings::Warnings;
 
@@ -84,6 +85,17 @@ pub fn import_bytes(
     name: &str,
     options: &Options,
 ) -> std::result::Result<Import, GltfError> {
+    import_while(bytes, base_dir, name, options, &mut |_| ())
+}
+
+/// [`import_bytes`], and what [`super::import_while`] says.
+pub(super) fn import_while(
+    bytes: &[u8],
+    base_dir: Option<&Path>,
+    name: &str,
+    options: &Options,
+    meanwhile: &mut dyn FnMut(&Import),
+) -> Result<Import> {
     let mut w = Warnings::default();
     let parts = container::split(bytes, name)?;
     std::thread::scope(|scope| {
@@ -91,7 +103,7 @@ pub fn import_bytes(
         let root = mend::root(parts.json, &mut w)?;
         extensions::check(&root, &mut w)?;
         let doc = Document::new(root, parts.bin, base_dir, &mut w)?;
-        assemble(&doc, base_dir, options, ahead, w)
+        assemble(&doc, base_dir, options, ahead, meanwhile, w)
     })
 }
 
@@ -100,28 +112,35 @@ fn assemble(
     base: Option<&Path>,
     options: &Options,
     ahead: Option<pictures::Ahead>,
+    meanwhile: &mut dyn FnMut(&Import),
     mut w: Warnings,
 ) -> Result<Import> {
     let nodes = nodes::build(doc, &clips::animated(doc), &mut w)?;
-    let geometry = geometry::build(doc, &nodes, &mut w)?;
+    let mut geometry = geometry::build(doc, &nodes, &mut w)?;
     let clips = clips::build(doc, &nodes, &geometry.runs, &mut w)?;
-    let looks = material::build(doc, base, options, &geometry, ahead, &mut w)?;
+    let (meshes, instances) = (take(&mut geometry.meshes), take(&mut geometry.instances));
     let character =
-        Character::new(nodes.skeleton, geometry.meshes, geometry.instances, geometry.rest_weights, clips)?;
+        Character::new(nodes.skeleton, meshes, instances, take(&mut geometry.rest_weights), clips)?;
     let cameras = mounts::cameras(doc, &nodes.in_scene, &nodes.bone_of, &mut w)?;
     let lights = mounts::lights(doc, &nodes.in_scene, &nodes.bone_of, &character)?;
     let mut extensions = doc.root.extensions_used.clone();
     extensions.extend(doc.root.extensions_required.iter().cloned());
     extensions.sort();
     extensions.dedup();
-    Ok(Import {
-        asset: Asset { character, materials: looks.materials, textures: looks.textures, cameras, lights },
+    let mut import = Import {
+        asset: Asset { character, cameras, lights, ..Asset::default() },
         format: "glTF".into(),
         generator: doc.root.asset.generator.clone().unwrap_or_default(),
         nodes: nodes.node_of,
-        primitives: geometry.sources,
+        primitives: take(&mut geometry.sources),
         extensions,
-        warnings: w.finish(),
         ..Import::default()
-    })
+    };
+    if ahead.as_ref().is_some_and(pictures::Ahead::is_at_work) {
+        meanwhile(&import);
+    }
+    let looks = material::build(doc, base, options, &geometry, ahead, &mut w)?;
+    (import.asset.materials, import.asset.textures) = (looks.materials, looks.textures);
+    import.warnings = w.finish();
+    Ok(import)
 }

@@ -94,6 +94,11 @@ impl<'s> Ahead<'s> {
         let picture = scope.spawn(move || budget.admit(Cow::Borrowed(bytes)).ok().map(|b| decode(&b)));
         Some(Self { bytes, picture })
     }
+
+    /// Whether it is not done yet.
+    pub fn is_at_work(&self) -> bool {
+        !self.picture.is_finished()
+    }
 }
 
 /// Decode the pictures that `wanted` names. What cannot be read is plain white and a warning.

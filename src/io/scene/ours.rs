@@ -151,7 +151,8 @@ fn character(name: &str, folder: &Path, options: &Options) -> Result<Import, Sce
         let why = format!("`{name}` leaves the folder above the scene's; put the character there or below");
         return Err(SceneError::value("character", why));
     }
-    read_import(&path, options, false).map_err(|e| SceneError::Character { path, source: Box::new(e) })
+    read_import(&path, options, false, &mut |_| ())
+        .map_err(|e| SceneError::Character { path, source: Box::new(e) })
 }
 
 /// Read a scene; also the name of its character.
