@@ -8,7 +8,7 @@ use crate::asset::Asset;
 use glam::{DVec3, Vec3};
 
 /// What a camera that orbits a character must hold over a clip: it needs neither materials nor textures, so that it can be found while
-/// pictures are decoded ([`import_while`](crate::io::import_while)). A [`Shot`](super::Shot) that frames the same takes it from here;
+/// pictures are decoded (`io::import_while`). A [`Shot`](super::Shot) that frames the same takes it from here;
 /// any other looks for itself, so that no picture depends on it.
 #[derive(Clone, Debug)]
 pub struct Foresight {

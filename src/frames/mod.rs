@@ -198,7 +198,7 @@ impl<'a> Shot<'a> {
         Self::foreseen(asset, desc, None)
     }
 
-    /// The same with what was found beforehand.
+    /// The same with what was found of this asset beforehand.
     ///
     /// # Errors
     /// Those of [`Shot::new`].
