@@ -64,6 +64,17 @@ mod tests {
     }
 
     #[test]
+    fn nlerp_strays_from_slerp_by_the_cube_of_the_angle() {
+        for deg in [10.0_f32, 30.0, 60.0, 90.0] {
+            let full = deg.to_radians();
+            let b = -Quat::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), full);
+            let off = |t: f32| angle_between(nlerp(Quat::IDENTITY, b, t), slerp(Quat::IDENTITY, b, t));
+            let worst = (0..=100).map(|k| off(k as f32 / 100.0)).fold(0.0, f32::max);
+            assert!((worst / (full.powi(3) / 249.0) - 1.0).abs() < 0.05, "{deg}°: {worst}");
+        }
+    }
+
+    #[test]
     fn the_short_arc_is_taken() {
         let b = -Quat::from_rotation_y(0.4);
         assert!(angle_between(slerp(Quat::IDENTITY, b, 0.5), Quat::from_rotation_y(0.2)) < 1e-6);

@@ -74,11 +74,6 @@ impl Format {
     pub fn is_film(self) -> bool {
         !matches!(self, Self::Png | Self::Exr)
     }
-
-    /// Whether it is made of linear light ([`Image`](crate::image::Image)) and not of 8-bit sRGB.
-    pub fn needs_linear(self) -> bool {
-        self == Self::Exr
-    }
 }
 
 impl std::str::FromStr for Format {
