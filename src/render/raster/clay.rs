@@ -36,9 +36,12 @@ pub(super) struct Clay<'a> {
 }
 
 impl Clay<'_> {
-    /// Fill `out`.
+    /// Fill `out`; lanes that nobody needs would fetch texels all the same.
     pub fn colors(self) {
-        simd::run_wide(self.frame.isa, self);
+        match self.n {
+            0..=8 => simd::run_narrow(self.frame.isa, self),
+            _ => simd::run_wide(self.frame.isa, self),
+        }
     }
 }
 
