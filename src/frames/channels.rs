@@ -26,13 +26,7 @@ impl Shot<'_> {
     pub fn extent(&self, worker: &mut Worker) -> Extent {
         let (mut low, mut high) = (Vec3A::INFINITY, Vec3A::NEG_INFINITY);
         let (mut near, mut far) = (f32::INFINITY, f32::NEG_INFINITY);
-        let span = Span {
-            asset: self.asset,
-            clip: self.desc.clip,
-            center: self.center,
-            shapes: None,
-            foresight: None,
-        };
+        let span = Span { asset: self.asset, clip: self.desc.clip, center: self.center, shapes: None };
         let drawn = if self.desc.renderer == Renderer::Raster { &[] } else { &self.shapes[..] };
         let shapes: Vec<Vec3> = drawn.iter().flat_map(|s| ends(&s.geometry)).collect();
         for t in fit::times(&span).0 {

@@ -1,6 +1,5 @@
 //! Which points a framing must hold: all vertices, over the whole clip.
 
-use super::foresight::Foresight;
 use super::framing::Framing;
 use super::worker::Worker;
 use crate::asset::Asset;
@@ -18,8 +17,6 @@ pub(super) struct Span<'a> {
     pub center: DVec3,
     /// A box around the shapes in it, as far as they end.
     pub shapes: Option<[Vec3; 2]>,
-    /// What was seen of it before.
-    pub foresight: Option<&'a Foresight>,
 }
 
 impl Span<'_> {

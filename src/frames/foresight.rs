@@ -45,7 +45,7 @@ impl Foresight {
             return None;
         }
         let mut worker = Worker::default();
-        let mut span = Span { asset, clip, center: DVec3::ZERO, shapes: None, foresight: None };
+        let mut span = Span { asset, clip, center: DVec3::ZERO, shapes: None };
         worker.evaluate(asset, clip, span.range().start);
         span.center = asset.character.center(&worker.posed);
         let (times, vertices) = fit::times(&span);

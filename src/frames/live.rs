@@ -101,7 +101,7 @@ impl Live {
     ) -> Stats {
         let skeleton = asset.character.skeleton();
         if self.figure.as_ref().is_none_or(|f| f.0 != *bones) {
-            let span = Span { asset, clip: None, center: self.center, shapes: None, foresight: None };
+            let span = Span { asset, clip: None, center: self.center, shapes: None };
             self.figure = Some((bones.clone(), Figure::new(&span, bones, &mut Worker::default())));
         }
         let mut rasterizer = std::mem::take(&mut self.worker.painter.rasterizer);

@@ -208,7 +208,7 @@ impl<'a> Shot<'a> {
     pub fn foreseen(
         asset: &'a Asset,
         desc: ShotDesc,
-        foresight: Option<&'a Foresight>,
+        foresight: Option<&Foresight>,
     ) -> Result<Self, ViewError> {
         let mut materials = look::materials(asset, &desc.look);
         let own = materials.len();
@@ -220,8 +220,8 @@ impl<'a> Shot<'a> {
         let center = asset.character.center(&worker.posed);
         let placed = |s: &Shape| Shape { geometry: s.geometry.moved(-center), material: own + s.material };
         let shapes: Vec<Shape> = desc.props.shapes.iter().map(placed).collect();
-        let span = Span { asset, clip: desc.clip, center, shapes: Shape::bounds(&shapes), foresight };
-        let stand = Stand::new(&span, &desc.view, desc.framing, aspect, &mut worker)?;
+        let span = Span { asset, clip: desc.clip, center, shapes: Shape::bounds(&shapes) };
+        let stand = Stand::new(&span, &desc.view, desc.framing, aspect, foresight, &mut worker)?;
         let stage = Stage::new(&span, &desc.look, &materials, &mut worker);
         let layers = Layers::new(&span, &desc.overlays, &mut worker)?;
         let developer = desc.look.grade.developer();

@@ -22,8 +22,7 @@ pub fn ground_point(asset: &Asset, clip: Option<usize>) -> DVec3 {
     let mut worker = Worker::default();
     worker.evaluate(asset, clip, clip.map_or(0.0, |c| asset.character.clips()[c].playback().start));
     let center = asset.character.center(&worker.posed);
-    let [low, high] =
-        fit::bounds(&Span { asset, clip, center, shapes: None, foresight: None }, None, &mut worker);
+    let [low, high] = fit::bounds(&Span { asset, clip, center, shapes: None }, None, &mut worker);
     if !low.is_finite() {
         return DVec3::ZERO;
     }

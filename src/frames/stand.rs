@@ -2,6 +2,7 @@
 
 use super::Moment;
 use super::fit::{self, Span};
+use super::foresight::Foresight;
 use super::framing::{Framing, Turns, orbit_axes};
 use super::view::{FramingDesc, Pivot, View, ViewError};
 use super::worker::Worker;
@@ -41,6 +42,7 @@ impl<'a> Stand<'a> {
         view: &View,
         framing: FramingDesc,
         aspect: f32,
+        foresight: Option<&Foresight>,
         worker: &mut Worker,
     ) -> Result<Self, ViewError> {
         check(span.asset, &framing)?;
@@ -51,7 +53,7 @@ impl<'a> Stand<'a> {
         let local = |p: DVec3| (p - center).as_vec3();
         let mut fitted = |axes: Mat3A, fov_y: f32| {
             let f = Framing::along(axes, fov_y, aspect, framing.fill()).turning(framing.turns, axis);
-            let seen = span.foresight.filter(|_| anchor.is_none()).and_then(|s| s.of(span, &f));
+            let seen = foresight.filter(|_| anchor.is_none()).and_then(|s| s.of(span, &f));
             seen.unwrap_or_else(|| fit::each_moment(span, anchor, worker, f))
         };
         let base = match *view {

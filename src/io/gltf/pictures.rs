@@ -308,6 +308,58 @@ fn decode(_: &[u8]) -> Result<Picture, String> {
 mod tests {
     use super::*;
 
+    /// A triangle with a picture, its bytes in the binary chunk of a GLB, or embedded.
+    fn triangle(picture: &[u8], glb: bool) -> Vec<u8> {
+        use base64::Engine;
+        let mut bin: Vec<u8> =
+            [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].iter().flat_map(|x| x.to_le_bytes()).collect();
+        bin.extend(picture);
+        bin.resize(bin.len().next_multiple_of(4), 0);
+        let uri = base64::engine::general_purpose::STANDARD.encode(&bin);
+        let uri = if glb { String::new() } else { format!(r#""uri": "data:;base64,{uri}", "#) };
+        let mut json = format!(
+            r#"{{ "asset": {{ "version": "2.0" }}, "nodes": [{{ "mesh": 0 }}], "buffers": [{{ {uri}"byteLength": {} }}],
+            "bufferViews": [{{ "buffer": 0, "byteLength": 36 }}, {{ "buffer": 0, "byteOffset": 36, "byteLength": {} }}],
+            "accessors": [{{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0,0,0], "max": [1,1,0] }}],
+            "images": [{{ "bufferView": 1, "mimeType": "image/jpeg" }}], "textures": [{{ "source": 0 }}],
+            "materials": [{{ "pbrMetallicRoughness": {{ "baseColorTexture": {{ "index": 0 }} }} }}],
+            "meshes": [{{ "primitives": [{{ "attributes": {{ "POSITION": 0 }}, "material": 0 }}] }}] }}"#,
+            bin.len(),
+            picture.len(),
+        )
+        .into_bytes();
+        if !glb {
+            return json;
+        }
+        json.resize(json.len().next_multiple_of(4), b' ');
+        let word = |n: usize| (n as u32).to_le_bytes();
+        let (head, size) = (word(2), word(28 + json.len() + bin.len()));
+        let (json_size, bin_size) = (word(json.len()), word(bin.len()));
+        [b"glTF", &head[..], &size, &json_size, b"JSON", &json, &bin_size, b"BIN\0", &bin].concat()
+    }
+
+    #[test]
+    fn a_picture_that_was_begun_at_a_glance_is_the_same() {
+        let pixels = (0..400 * 400 * 3u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+        let picture = image::RgbImage::from_raw(400, 400, pixels).unwrap();
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        picture.write_to(&mut bytes, image::ImageFormat::Jpeg).unwrap();
+        let whole = bytes.into_inner();
+        for picture in [&whole[..], &whole[..whole.len() / 2], &vec![7; 2 * LONG]] {
+            assert!(picture.len() >= LONG, "{} bytes are not begun with", picture.len());
+            let (glb, embedded) = (triangle(picture, true), triangle(picture, false));
+            let parts = super::super::container::split(&glb, "a.glb").unwrap();
+            assert_eq!(glance::first_picture(&parts), Some(picture));
+            let import = |bytes: &[u8]| {
+                let options = crate::io::Options { textures: true };
+                super::super::import_bytes(bytes, None, "a.glb", &options).unwrap()
+            };
+            let (early, late) = (import(&glb), import(&embedded));
+            assert!(!late.asset.textures.is_empty() && early.asset.textures == late.asset.textures);
+            assert_eq!(early.warnings, late.warnings);
+        }
+    }
+
     #[test]
     fn the_short_way_into_rgba_gives_the_same_pixels() {
         for (w, h) in [(1, 1), (16, 16), (61, 47), (200, 9)] {
