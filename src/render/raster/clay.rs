@@ -1,47 +1,84 @@
-//! Points of one triangle of clay: lit by nothing but lamps, and of a material that is the same all over but for its colour.
+//! Points of clay: lit by nothing but lamps, and of a material that is the same all over but for its colour.
 //!
-//! Most of a picture is made of it, so it has a kernel of its own, which asks nothing at every point that the triangle can answer, and which
-//! is as wide as the machine: sixteen points at once take half the instructions of twice eight.
+//! Most of a picture is made of it, so it has kernels of its own, which ask nothing at every point that the triangle can answer, and which
+//! are as wide as the machine. What a triangle gives is put down first, side by side with what others of the draw give; then all of
+//! it is lit, then encoded. A point's operations wait for each other, from its edges to its code: three short loops let the processor
+//! work at several points at once where one long one would not, and no lanes are left empty at a triangle's end.
 
 use super::TILE;
+use super::colors::{Colors, Sink};
 use super::encode;
 use super::frame::{Draw, Frame};
-use super::resolve::{self, Shades};
-use super::scan::{self, Key};
+use super::resolve;
+use super::scan::{self, Chain, Key, ROOM};
 use crate::math::lanes::V3;
-use crate::math::simd::{self, F, I, WideKernel};
+use crate::math::simd::{self, F, I, Kernel, WideKernel};
 use crate::render::sample::{self, Uv};
 use crate::render::shade::{self, Surface};
 use crate::render::varying;
 use crate::scene::{Camera, Projection};
 use glam::{Vec2, Vec3, Vec4};
 
-/// Points to be shaded.
+/// So many points wait at most: they and their light stay in the cache next to the processor.
+const MOST: usize = 256;
+
+/// Their places, and those that the last lanes reach beyond them.
+const LEN: usize = MOST + ROOM;
+
+/// Points of one draw that wait for their light, a plane a number.
+#[derive(Debug)]
+#[repr(align(64))]
+pub(super) struct Points {
+    keys: [Key; LEN],
+    position: [[f32; LEN]; 3],
+    /// Unit, on the eye's side.
+    normal: [[f32; LEN]; 3],
+    /// `k_d`, if the draw has a map of it.
+    diffuse: [[f32; LEN]; 3],
+    light: [[f32; LEN]; 3],
+    codes: [i32; LEN],
+}
+
+impl Default for Points {
+    fn default() -> Self {
+        let planes = [[0.0; LEN]; 3];
+        let (position, normal, diffuse, light) = (planes, planes, planes, planes);
+        Self { keys: [0; LEN], position, normal, diffuse, light, codes: [0; LEN] }
+    }
+}
+
+/// Lanes of three planes.
+#[inline(always)]
+fn load<const N: usize>(planes: &[[f32; LEN]; 3], at: usize) -> V3<F<N>> {
+    let [x, y, z] = planes;
+    V3::new(F::load(&x[at..]), F::load(&y[at..]), F::load(&z[at..]))
+}
+
+#[inline(always)]
+fn store<const N: usize>(planes: &mut [[f32; LEN]; 3], at: usize, v: V3<F<N>>) {
+    let [x, y, z] = planes;
+    v.x.store(&mut x[at..]);
+    v.y.store(&mut y[at..]);
+    v.z.store(&mut z[at..]);
+}
+
+/// Triangles of one draw to be shaded.
 pub(super) struct Clay<'a> {
     pub frame: &'a Frame<'a>,
     pub draw: &'a Draw<'a>,
-    /// The triangle, counted in the draw.
-    pub id: u32,
-    /// Its corners, by [`super::surface::corners_of`].
-    pub known: &'a [Vec4; 3],
-    /// Where in the tile; beyond the last that counts, any that are there fill the lanes.
-    pub keys: &'a [Key],
-    /// How many count.
-    pub n: usize,
+    /// What is seen of them, in `keys`; each has [`ROOM`] behind it.
+    pub chains: &'a [Chain],
+    pub keys: &'a mut [Key],
     /// The tile's first pixel, from the picture's centre.
     pub corner: [f32; 2],
-    /// Whether `out` takes codes.
-    pub coded: bool,
-    pub out: &'a mut Shades,
+    pub points: &'a mut Points,
+    pub colors: &'a mut Colors,
 }
 
 impl Clay<'_> {
-    /// Fill `out`; lanes that nobody needs would fetch texels all the same.
-    pub fn colors(self) {
-        match self.n {
-            0..=8 => simd::run_narrow(self.frame.isa, self),
-            _ => simd::run_wide(self.frame.isa, self),
-        }
+    /// Put their colours where they belong.
+    pub fn shade(self) {
+        simd::run_wide(self.frame.isa, self);
     }
 }
 
@@ -50,27 +87,55 @@ impl WideKernel for Clay<'_> {
 
     #[inline(always)]
     fn run<const N: usize>(self) {
-        let Self { frame, draw, id, known, keys, n, corner, coded, out } = self;
-        let (scene, m) = (frame.scene, draw.material);
-        let edges = Edges::new(known, corner, keys[0]);
-        let t = draw.object.mesh.triangles[id as usize];
-        let positions = Attribute(corners(draw.object.positions, t));
-        let normals = Attribute(side(draw, &scene.camera, &positions.0, corners(draw.object.normals, t)));
-        let skin = draw.skin.map(|(texture, map)| {
-            let uvs = corners(&draw.object.mesh.uvs[(map.uv_set & 1) as usize], t);
-            (texture, uvs.map(|uv| map.transform.transform_point2(uv)))
-        });
-        for (i, keys) in keys.as_chunks::<N>().0[..n.div_ceil(N)].iter().enumerate() {
-            let (b, scale) = edges.at(&I(*keys));
-            let position = positions.at(&b);
-            let mut k_d = V3::splat(m.diffuse.truncate());
-            if let Some((texture, uvs)) = &skin {
-                let [r, g, b, _] = sample::sample(frame.isa, texture, &edges.uv(uvs, &b, scale));
-                k_d = k_d * V3::new(r, g, b);
+        let Self { frame, draw, chains, keys, corner, points, colors } = self;
+        let mut n = 0;
+        for chain in chains {
+            let count = chain.count as usize;
+            let keys = &mut keys[chain.first as usize..][..count.next_multiple_of(N)];
+            // Lanes that nobody needs would fetch texels all the same.
+            for k in count..keys.len() {
+                keys[k] = keys[0];
             }
+            let triangle = Triangle::new(frame, draw, chain.id - draw.first_triangle, corner, keys[0]);
+            for (i, keys) in keys.as_chunks::<N>().0.iter().enumerate() {
+                if n + N > LEN {
+                    simd::run_as::<N, _>(frame.isa, Lit::<N> { frame, draw, points, n, colors });
+                    n = 0;
+                }
+                triangle.put_down(frame, draw, &I(*keys), points, n);
+                n += (count - i * N).min(N);
+            }
+        }
+        simd::run_as::<N, _>(frame.isa, Lit::<N> { frame, draw, points, n, colors });
+    }
+}
+
+/// Points that have been put down, to be lit and encoded.
+struct Lit<'a, const N: usize> {
+    frame: &'a Frame<'a>,
+    draw: &'a Draw<'a>,
+    points: &'a mut Points,
+    n: usize,
+    colors: &'a mut Colors,
+}
+
+impl<const N: usize> Kernel for Lit<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { frame, draw, points, n, colors } = self;
+        let (scene, m) = (frame.scene, draw.material);
+        let Points { keys, position, normal, diffuse, light, codes } = points;
+        for at in (0..n).step_by(N) {
+            let position = load::<N>(position, at);
+            let k_d = match draw.skin {
+                Some(_) => load(diffuse, at),
+                None => V3::splat(m.diffuse.truncate()),
+            };
             let s = Surface {
                 position,
-                normal: normals.at(&b).unit(),
+                normal: load(normal, at),
                 view: varying::view(&scene.camera, position),
                 ambient: m.ambient.map_or(k_d, V3::splat),
                 diffuse: k_d,
@@ -79,15 +144,52 @@ impl WideKernel for Clay<'_> {
                 openness: F::ONE,
                 emissive: V3::splat(m.emissive),
             };
-            let light = shade::shadowed(&s, V3::splat(scene.ambient), &frame.lamps, &[], true);
-            let rgb = [light.x, light.y, light.z];
-            if coded {
-                out.codes.as_chunks_mut::<N>().0[i] = encode::encode_opaque(rgb).0;
-                continue;
+            store(light, at, shade::shadowed(&s, V3::splat(scene.ambient), &frame.lamps, &[], true));
+        }
+        if colors.sink == Sink::Codes {
+            for at in (0..n).step_by(N) {
+                let V3 { x, y, z } = load::<N>(light, at);
+                let words: &mut [i32; N] = (&mut codes[at..at + N]).try_into().expect("as many as lanes");
+                *words = encode::encode_opaque([x, y, z]).0;
             }
-            for (plane, channel) in out.light.iter_mut().zip([rgb[0], rgb[1], rgb[2], F::ONE]) {
-                plane.as_chunks_mut::<N>().0[i] = channel.0;
-            }
+        }
+        colors.put_opaque(&keys[..n], light, codes);
+    }
+}
+
+/// A triangle, ready to be asked at points.
+struct Triangle {
+    edges: Edges,
+    positions: Attribute,
+    normals: Attribute,
+    /// Coordinates of the map, if the draw has one.
+    uvs: [Vec2; 3],
+}
+
+impl Triangle {
+    #[inline(always)]
+    fn new(frame: &Frame, draw: &Draw, id: u32, corner: [f32; 2], key: Key) -> Self {
+        let t = draw.object.mesh.triangles[id as usize];
+        let positions = corners(draw.object.positions, t);
+        let edges = Edges::new(&positions.map(|p| frame.project.point(p)), corner, key);
+        let normals = side(draw, &frame.scene.camera, &positions, corners(draw.object.normals, t));
+        let uvs = draw.skin.map_or([Vec2::ZERO; 3], |(_, map)| {
+            let uvs = corners(&draw.object.mesh.uvs[(map.uv_set & 1) as usize], t);
+            uvs.map(|uv| map.transform.transform_point2(uv))
+        });
+        Self { edges, positions: Attribute(positions), normals: Attribute(normals), uvs }
+    }
+
+    /// What it gives at points.
+    #[inline(always)]
+    fn put_down<const N: usize>(&self, frame: &Frame, draw: &Draw, keys: &I<N>, points: &mut Points, at: usize) {
+        let (b, scale) = self.edges.at(keys);
+        points.keys[at..at + N].copy_from_slice(&keys.0);
+        store(&mut points.position, at, self.positions.at(&b));
+        store(&mut points.normal, at, self.normals.at(&b).unit());
+        if let Some((texture, _)) = draw.skin {
+            let [r, g, b, _] = sample::sample(frame.isa, texture, &self.edges.uv(&self.uvs, &b, scale));
+            store(&mut points.diffuse, at, V3::splat(draw.material.diffuse.truncate()) * V3::new(r, g, b));
         }
     }
 }
@@ -101,13 +203,16 @@ fn corners<T: Copy>(list: &[T], t: [u32; 3]) -> [T; 3] {
 /// Normals on the eye's side, if the material has two: the eye sees one side of a whole triangle.
 #[inline(always)]
 fn side(draw: &Draw, camera: &Camera, p: &[Vec3; 3], n: [Vec3; 3]) -> [Vec3; 3] {
+    if !draw.material.double_sided {
+        return n;
+    }
     let face = (p[1] - p[0]).cross(p[2] - p[0]);
     let view = match camera.projection {
         Projection::Perspective { .. } => camera.eye() - p[0],
         Projection::Orthographic { .. } => camera.scene_from_view.matrix3.z_axis.into(),
     };
     let away = (face.dot(view) < 0.0) != draw.object.mirrored;
-    if draw.material.double_sided && away { [-n[0], -n[1], -n[2]] } else { n }
+    if away { [-n[0], -n[1], -n[2]] } else { n }
 }
 
 /// What is mixed between corners.

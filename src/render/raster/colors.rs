@@ -77,14 +77,11 @@ impl Colors {
     /// Put eight colours, of which `n` count, where they belong.
     #[inline(always)]
     pub fn put(&mut self, keys: &I8, n: usize, rgba: &[F8; 4]) {
+        let lane = |k: usize| [rgba[0].0[k], rgba[1].0[k], rgba[2].0[k], rgba[3].0[k]];
         match self.sink {
             Sink::Codes => self.put_codes(keys, n, rgba),
-            Sink::Linear => {
-                for k in 0..n {
-                    self.put_light(keys.0[k], rgba, k);
-                }
-            }
-            Sink::Layers => self.put_samples(keys, n, rgba),
+            Sink::Linear => (0..n).for_each(|k| self.put_light(keys.0[k], lane(k))),
+            Sink::Layers => (0..n).for_each(|k| self.put_samples(keys.0[k], lane(k))),
         }
     }
 
@@ -112,24 +109,41 @@ impl Colors {
             if covers(keys.0[k]) == WHOLE {
                 self.codes[scan::place(keys.0[k])] = words.0[k] as u32;
             } else {
-                self.put_light(keys.0[k], rgba, k);
+                self.put_light(keys.0[k], [rgba[0].0[k], rgba[1].0[k], rgba[2].0[k], rgba[3].0[k]]);
             }
         }
     }
 
-    /// Put codes of whole pixels.
+    /// Put colours of opaque surfaces where they belong: light, a plane a channel, and its codes if these are wanted.
     #[inline(always)]
-    pub fn put_words(&mut self, keys: &[Key], words: &[i32]) {
-        let codes: &mut [u32; PLANE] = (&mut self.codes[..PLANE]).try_into().expect("a tile");
-        for (key, word) in keys.iter().zip(words) {
-            codes[scan::place(*key)] = *word as u32;
+    pub fn put_opaque<const L: usize>(&mut self, keys: &[Key], light: &[[f32; L]; 3], words: &[i32; L]) {
+        let rgba = |k: usize| [light[0][k], light[1][k], light[2][k], 1.0];
+        for (i, keys) in keys.chunks(16).enumerate() {
+            let lights = keys.iter().enumerate().map(|(k, &key)| (key, rgba(16 * i + k)));
+            match self.sink {
+                Sink::Codes if scan::are_whole(keys) => {
+                    let codes: &mut [u32; PLANE] = (&mut self.codes[..PLANE]).try_into().expect("a tile");
+                    for (&key, &word) in keys.iter().zip(&words[16 * i..]) {
+                        codes[scan::place(key)] = word as u32;
+                    }
+                }
+                Sink::Codes => {
+                    for ((key, light), &word) in lights.zip(&words[16 * i..]) {
+                        match covers(key) {
+                            WHOLE => self.codes[scan::place(key)] = word as u32,
+                            _ => self.put_light(key, light),
+                        }
+                    }
+                }
+                Sink::Linear => lights.for_each(|(key, light)| self.put_light(key, light)),
+                Sink::Layers => lights.for_each(|(key, light)| self.put_samples(key, light)),
+            }
         }
     }
 
     /// Store linear light, or add the share of a pixel that an evaluation stands for.
     #[inline(always)]
-    fn put_light(&mut self, key: Key, rgba: &[F8; 4], k: usize) {
-        let light = [rgba[0].0[k], rgba[1].0[k], rgba[2].0[k], rgba[3].0[k]];
+    fn put_light(&mut self, key: Key, light: [f32; 4]) {
         let sum = &mut self.sums[scan::place(key)];
         if covers(key) == WHOLE {
             *sum = light;
@@ -142,13 +156,11 @@ impl Colors {
     }
 
     #[inline(never)]
-    fn put_samples(&mut self, keys: &I8, n: usize, rgba: &[F8; 4]) {
-        for (k, &key) in keys.0[..n].iter().enumerate() {
-            let samples = if self.samples == 1 { 1 } else { covers(key) };
-            for s in bits(samples) {
-                for c in 0..4 {
-                    self.planes[c][s as usize * PLANE + scan::place(key)] = rgba[c].0[k];
-                }
+    fn put_samples(&mut self, key: Key, light: [f32; 4]) {
+        let samples = if self.samples == 1 { 1 } else { covers(key) };
+        for s in bits(samples) {
+            for c in 0..4 {
+                self.planes[c][s as usize * PLANE + scan::place(key)] = light[c];
             }
         }
     }

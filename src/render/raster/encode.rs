@@ -59,6 +59,18 @@ impl Target<'_> {
         if matches!(self, Target::Rgba8 { .. }) { Sink::Codes } else { Sink::Linear }
     }
 
+    /// Fill it with the background if all of that's bytes are the same, which memory takes in by itself at twice the speed: it need not
+    /// be read first. Whether it was.
+    pub fn clear(&mut self, background: [f32; 4]) -> bool {
+        let Target::Rgba8 { data, .. } = self else { return false };
+        let code = color::encode_srgb8(background);
+        let same = code == [code[0]; 4];
+        if same {
+            data.fill(code[0]);
+        }
+        same
+    }
+
     /// Write a tile that starts at column `x` and is `w` pixels wide.
     pub fn write(&mut self, x: usize, w: usize, colors: &Colors) {
         let rows = self.rows();

@@ -6,7 +6,7 @@ use super::clay::Clay;
 use super::colors::{Colors, Sink};
 use super::frame::{Draw, Frame, ROTATED};
 use super::merge::share_a_vertex;
-use super::scan::{self, Key, ROOM, WHOLE, covers, key};
+use super::scan::{self, Chain, Key, WHOLE, covers, key};
 use super::setup::Bins;
 use super::surface::{self, Corners, Shade};
 use super::tile::TileScratch;
@@ -42,17 +42,14 @@ impl Area {
     }
 }
 
-/// Colours of as many batches: light, a plane a channel, or codes.
+/// Light of as many batches, a plane a channel.
 #[derive(Debug)]
 #[repr(align(64))]
-pub(super) struct Shades {
-    pub light: [[f32; 8 * BATCHES]; 4],
-    pub codes: [i32; 8 * BATCHES],
-}
+pub(super) struct Shades([[f32; 8 * BATCHES]; 4]);
 
 impl Default for Shades {
     fn default() -> Self {
-        Self { light: [[0.0; 8 * BATCHES]; 4], codes: [0; 8 * BATCHES] }
+        Self([[0.0; 8 * BATCHES]; 4])
     }
 }
 
@@ -60,7 +57,7 @@ impl Shades {
     /// Eight of them.
     #[inline(always)]
     pub fn batch(&self, i: usize) -> [F8; 4] {
-        let c = &self.light;
+        let c = &self.0;
         [
             F8::load(&c[0][8 * i..]),
             F8::load(&c[1][8 * i..]),
@@ -72,7 +69,7 @@ impl Shades {
     #[inline(always)]
     pub fn set(&mut self, i: usize, rgba: &[F8; 4]) {
         for c in 0..4 {
-            rgba[c].store(&mut self.light[c][8 * i..]);
+            rgba[c].store(&mut self.0[c][8 * i..]);
         }
     }
 }
@@ -95,55 +92,57 @@ pub(super) fn resolve(
     } else {
         scan::scan(frame, area, scratch);
     }
-    for k in 0..scratch.entries.chains.len() {
-        chain(frame, area, k, scratch);
+    let mut k = 0;
+    while k < scratch.entries.chains.len() {
+        k = chain(frame, area, k, scratch);
     }
     loose(frame, area, scratch);
     scratch.colors.finish();
 }
 
-/// Shade the pixels of one triangle; leave a few to be shaded with those of others.
+/// Shade the pixels of one triangle, or of those of clay of one draw that follow each other; leave a few to be shaded with those of
+/// others. The next chain.
 #[inline(always)]
-fn chain(frame: &Frame, area: Area, k: usize, scratch: &mut TileScratch) {
-    let TileScratch { colors, stats, last_draw, entries, shades, .. } = scratch;
+fn chain(frame: &Frame, area: Area, k: usize, scratch: &mut TileScratch) -> usize {
+    let TileScratch { colors, stats, last_draw, entries, shades, points, .. } = scratch;
     let chain = entries.chains[k];
-    let mut done = 0;
-    if chain.count >= GROUP {
-        let draw = last_draw.find(frame, chain.id);
-        let ids = [[chain.id - draw.first_triangle; 8]];
-        let known = surface::corners_of(frame, draw, ids[0][0]);
-        let corner = area.corner(frame);
-        while chain.count - done >= GROUP {
-            let at = (chain.first + done) as usize;
-            let left = (chain.count - done) as usize;
-            let n = left.min(8 * BATCHES);
-            let n = if n % 8 >= GROUP as usize { n } else { n & !7 };
-            // There is room beyond the chain's end for lanes that repeat the first.
-            let keys = &mut entries.keys[at..at + n.next_multiple_of(ROOM)];
-            for k in left..keys.len() {
-                keys[k] = keys[0];
-            }
-            done += n as u32;
-            if draw.clay {
-                let (id, known, out) = (ids[0][0], &known, &mut *shades);
-                let coded = colors.sink == Sink::Codes && scan::are_whole(keys);
-                Clay { frame, draw, id, known, keys, n, corner, coded, out }.colors();
-                if coded {
-                    colors.put_words(&keys[..n], &shades.codes);
-                    continue;
-                }
-            } else {
-                let keys = &keys.as_chunks::<8>().0[..n.div_ceil(8)];
-                let (ids, known, found, out) = (&ids, &known, &mut [], &mut *shades);
-                Shade::<true> { frame, draw, ids, known, found, keys, corner, out }.colors();
-            }
-            for (i, keys) in keys.as_chunks::<8>().0[..n.div_ceil(8)].iter().enumerate() {
-                colors.put(&I(*keys), (n - 8 * i).min(8), &shades.batch(i));
-            }
-        }
-        stats.shaded += done as u64;
+    if chain.count < GROUP {
+        entries.loosen(chain, 0);
+        return k + 1;
     }
+    let draw = last_draw.find(frame, chain.id);
+    let corner = area.corner(frame);
+    if draw.clay {
+        let ours = |c: &&Chain| c.count >= GROUP && draw.ids().contains(&c.id);
+        let n = entries.chains[k..].iter().take_while(ours).count();
+        let (chains, keys) = (&entries.chains[k..k + n], &mut entries.keys[..]);
+        stats.shaded += chains.iter().map(|c| c.count as u64).sum::<u64>();
+        Clay { frame, draw, chains, keys, corner, points, colors }.shade();
+        return k + n;
+    }
+    let ids = [[chain.id - draw.first_triangle; 8]];
+    let known = surface::corners_of(frame, draw, ids[0][0]);
+    let mut done = 0;
+    while chain.count - done >= GROUP {
+        let at = (chain.first + done) as usize;
+        let left = (chain.count - done) as usize;
+        let n = left.min(8 * BATCHES);
+        let n = if n % 8 >= GROUP as usize { n } else { n & !7 };
+        // There is room beyond the chain's end for lanes that repeat the first.
+        let keys = &mut entries.keys[at..at + n.next_multiple_of(8)];
+        for k in left..keys.len() {
+            keys[k] = keys[0];
+        }
+        done += n as u32;
+        let keys = keys.as_chunks::<8>().0;
+        Shade::<true> { frame, draw, ids: &ids, known: &known, found: &mut [], keys, corner, out: shades }.colors();
+        for (i, keys) in keys.iter().enumerate() {
+            colors.put(&I(*keys), (n - 8 * i).min(8), &shades.batch(i));
+        }
+    }
+    stats.shaded += done as u64;
     entries.loosen(chain, done);
+    k + 1
 }
 
 /// Where evaluations are made, from the picture's centre; `corner` is the tile's first pixel.
@@ -349,7 +348,7 @@ pub(super) fn shade_list(
         rest[..n].iter().for_each(|l| waiting.push(key(l.place as usize, l.mask as u32), l.id));
         waiting.colors(frame, draw, area);
         for k in 0..n {
-            let c = &waiting.rgba.light;
+            let c = &waiting.rgba.0;
             out.push([c[0][k], c[1][k], c[2][k], c[3][k]]);
         }
         rest = &rest[n..];

@@ -1,6 +1,7 @@
 //! A row of tiles: visibility, then colour, one tile after the other.
 
 use super::blend::{self, BlendScratch};
+use super::clay::Points;
 use super::colors::{Colors, Sink};
 use super::encode::Target;
 use super::fill::{All, Keep, Visibility, Walk, lane_offsets};
@@ -25,6 +26,7 @@ pub(super) struct TileScratch {
     /// Runs of entries of one draw.
     pub runs: Vec<(u32, u32, u32)>,
     pub shades: Shades,
+    pub points: Points,
 }
 
 /// The tiles of one row.
@@ -44,15 +46,16 @@ impl Kernel for Row<'_, '_> {
     #[inline(always)]
     fn run(mut self) {
         let tiles = self.tiles;
+        let cleared = self.target.clear(self.frame.scene.background);
         for column in tiles.x / TILE..(tiles.x + tiles.width).div_ceil(TILE) {
-            self.tile(column);
+            self.tile(column, cleared);
         }
     }
 }
 
 impl Row<'_, '_> {
     #[inline(always)]
-    fn tile(&mut self, column: usize) {
+    fn tile(&mut self, column: usize, cleared: bool) {
         let frame = self.frame;
         let index = self.row * frame.tiles_x + column;
         let (x, w) = (column * TILE, TILE.min(frame.width as usize - column * TILE));
@@ -62,7 +65,10 @@ impl Row<'_, '_> {
             t.fragments.is_empty() && t.solid.is_empty() && t.blend.is_empty()
         };
         if self.bins.iter().all(empty) {
-            return self.target.fill(to, w, frame.scene.background);
+            if !cleared {
+                self.target.fill(to, w, frame.scene.background);
+            }
+            return;
         }
 
         // What is visible at each sample?
