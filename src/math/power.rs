@@ -48,10 +48,21 @@ pub fn pow<const N: usize>(x: F<N>, y: F<N>) -> F<N> {
     x.gt(tiny).select(exp2(y * log2(x.max(tiny))), F::ZERO)
 }
 
+/// From where on the `n`-th power is `2⁻¹²⁰` at least.
+static LEAST: [f32; 65] = {
+    let mut least = [0.0; 65];
+    let mut n = 1;
+    while n < least.len() {
+        least[n] = f32::from_bits((127 - 120 / n as u32) << 23);
+        n += 1;
+    }
+    least
+};
+
 /// `xⁿ` by squares (Knuth 4.6.3); 0 where a product would come near the smallest numbers, with which machines are slow.
 #[inline(always)]
 fn whole_power<const N: usize>(x: F<N>, mut n: u32) -> F<N> {
-    let least = F::splat(f32::from_bits((127 - 120 / n) << 23));
+    let least = F::splat(LEAST[n as usize % LEAST.len()]);
     let (mut square, mut out) = (x.gt(least).select(x, F::ZERO), F::ONE);
     loop {
         if n & 1 != 0 {

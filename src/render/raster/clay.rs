@@ -35,6 +35,8 @@ pub(super) struct Points {
     normal: [[f32; LEN]; 3],
     /// `k_d`, if the draw has a map of it.
     diffuse: [[f32; LEN]; 3],
+    /// Unit, towards the eye.
+    view: [[f32; LEN]; 3],
     light: [[f32; LEN]; 3],
     codes: [i32; LEN],
 }
@@ -42,8 +44,31 @@ pub(super) struct Points {
 impl Default for Points {
     fn default() -> Self {
         let planes = [[0.0; LEN]; 3];
-        let (position, normal, diffuse, light) = (planes, planes, planes, planes);
-        Self { keys: [0; LEN], position, normal, diffuse, light, codes: [0; LEN] }
+        let (position, normal, diffuse, view, light) = (planes, planes, planes, planes, planes);
+        Self { keys: [0; LEN], position, normal, diffuse, view, light, codes: [0; LEN] }
+    }
+}
+
+impl Points {
+    /// Some of them, side by side.
+    #[inline(always)]
+    fn surface<const N: usize>(&self, draw: &Draw, at: usize) -> Surface<F<N>> {
+        let m = draw.material;
+        let k_d = match draw.skin {
+            Some(_) => load(&self.diffuse, at),
+            None => V3::splat(m.diffuse.truncate()),
+        };
+        Surface {
+            position: load(&self.position, at),
+            normal: load(&self.normal, at),
+            view: load(&self.view, at),
+            ambient: m.ambient.map_or(k_d, V3::splat),
+            diffuse: k_d,
+            specular: V3::splat(m.specular),
+            shininess: F::splat(m.shininess),
+            openness: F::ONE,
+            emissive: V3::splat(m.emissive),
+        }
     }
 }
 
@@ -125,27 +150,21 @@ impl<const N: usize> Kernel for Lit<'_, N> {
     #[inline(always)]
     fn run(self) {
         let Self { frame, draw, points, n, colors } = self;
-        let (scene, m) = (frame.scene, draw.material);
-        let Points { keys, position, normal, diffuse, light, codes } = points;
+        let scene = frame.scene;
         for at in (0..n).step_by(N) {
-            let position = load::<N>(position, at);
-            let k_d = match draw.skin {
-                Some(_) => load(diffuse, at),
-                None => V3::splat(m.diffuse.truncate()),
-            };
-            let s = Surface {
-                position,
-                normal: load(normal, at),
-                view: varying::view(&scene.camera, position),
-                ambient: m.ambient.map_or(k_d, V3::splat),
-                diffuse: k_d,
-                specular: V3::splat(m.specular),
-                shininess: F::splat(m.shininess),
-                openness: F::ONE,
-                emissive: V3::splat(m.emissive),
-            };
-            store(light, at, shade::shadowed(&s, V3::splat(scene.ambient), &frame.lamps, &[], true));
+            store(&mut points.view, at, varying::view(&scene.camera, load::<N>(&points.position, at)));
+            let light = shade::unlit(&points.surface::<N>(draw, at), V3::splat(scene.ambient));
+            store(&mut points.light, at, light);
         }
+        for lamp in &frame.lamps {
+            for at in (0..n).step_by(N) {
+                let s = points.surface::<N>(draw, at);
+                let a = shade::arrival(lamp, s.position);
+                let light = load(&points.light, at) + a.intensity * shade::reflected(&s, a.towards, true);
+                store(&mut points.light, at, light);
+            }
+        }
+        let Points { keys, light, codes, .. } = points;
         if colors.sink == Sink::Codes {
             for at in (0..n).step_by(N) {
                 let V3 { x, y, z } = load::<N>(light, at);
