@@ -106,14 +106,10 @@ pub(super) fn resolve(
 fn chain(frame: &Frame, area: Area, k: usize, scratch: &mut TileScratch) -> usize {
     let TileScratch { colors, stats, last_draw, entries, shades, points, .. } = scratch;
     let chain = entries.chains[k];
-    if chain.count < GROUP {
-        entries.loosen(chain, 0);
-        return k + 1;
-    }
     let draw = last_draw.find(frame, chain.id);
     let corner = area.corner(frame);
     if draw.clay {
-        let ours = |c: &&Chain| c.count >= GROUP && draw.ids().contains(&c.id);
+        let ours = |c: &&Chain| draw.ids().contains(&c.id);
         let n = entries.chains[k..].iter().take_while(ours).count();
         let (chains, keys) = (&entries.chains[k..k + n], &mut entries.keys[..]);
         stats.shaded += chains.iter().map(|c| c.count as u64).sum::<u64>();
