@@ -33,6 +33,8 @@ pub(super) struct Points {
     position: [[f32; LEN]; 3],
     /// Unit, on the eye's side.
     normal: [[f32; LEN]; 3],
+    /// Where in the map of `k_d`, if the draw has one: coordinates, and their slopes to the right and down.
+    uv: [[[f32; LEN]; 2]; 3],
     /// `k_d`, if the draw has a map of it.
     diffuse: [[f32; LEN]; 3],
     /// Unit, towards the eye.
@@ -45,11 +47,30 @@ impl Default for Points {
     fn default() -> Self {
         let planes = [[0.0; LEN]; 3];
         let (position, normal, diffuse, view, light) = (planes, planes, planes, planes, planes);
-        Self { keys: [0; LEN], position, normal, diffuse, view, light, codes: [0; LEN] }
+        let uv = [[[0.0; LEN]; 2]; 3];
+        Self { keys: [0; LEN], position, normal, uv, diffuse, view, light, codes: [0; LEN] }
     }
 }
 
 impl Points {
+    /// Where some of them lie in the map.
+    #[inline(always)]
+    fn uv<const N: usize>(&self, at: usize) -> Uv<N> {
+        let [along, right, down] = &self.uv;
+        let load = |planes: &[[f32; LEN]; 2]| [F::load(&planes[0][at..]), F::load(&planes[1][at..])];
+        let [u, v] = load(along);
+        Uv { u, v, right: load(right), down: load(down) }
+    }
+
+    /// Let lanes beyond the last repeat it: they would fetch texels that nobody needs.
+    #[inline(always)]
+    fn repeat_last<const N: usize>(&mut self, n: usize) {
+        for plane in self.uv.as_flattened_mut() {
+            let last = plane[n - 1];
+            plane[n..n.next_multiple_of(N)].fill(last);
+        }
+    }
+
     /// Some of them, side by side.
     #[inline(always)]
     fn surface<const N: usize>(&self, draw: &Draw, at: usize) -> Surface<F<N>> {
@@ -117,7 +138,6 @@ impl WideKernel for Clay<'_> {
         for chain in chains {
             let count = chain.count as usize;
             let keys = &mut keys[chain.first as usize..][..count.next_multiple_of(N)];
-            // Lanes that nobody needs would fetch texels all the same.
             for k in count..keys.len() {
                 keys[k] = keys[0];
             }
@@ -127,7 +147,7 @@ impl WideKernel for Clay<'_> {
                     simd::run_as::<N, _>(frame.isa, Lit::<N> { frame, draw, points, n, colors });
                     n = 0;
                 }
-                triangle.put_down(frame, draw, &I(*keys), points, n);
+                triangle.put_down(draw.skin.is_some(), &I(*keys), points, n);
                 n += (count - i * N).min(N);
             }
         }
@@ -151,6 +171,14 @@ impl<const N: usize> Kernel for Lit<'_, N> {
     fn run(self) {
         let Self { frame, draw, points, n, colors } = self;
         let scene = frame.scene;
+        if let Some((texture, _)) = draw.skin {
+            points.repeat_last::<N>(n);
+            let k_d = V3::splat(draw.material.diffuse.truncate());
+            for at in (0..n).step_by(N) {
+                let [r, g, b, _] = sample::sample(frame.isa, texture, &points.uv::<N>(at));
+                store(&mut points.diffuse, at, k_d * V3::new(r, g, b));
+            }
+        }
         for at in (0..n).step_by(N) {
             store(&mut points.view, at, varying::view(&scene.camera, load::<N>(&points.position, at)));
             let light = shade::unlit(&points.surface::<N>(draw, at), V3::splat(scene.ambient));
@@ -201,14 +229,17 @@ impl Triangle {
 
     /// What it gives at points.
     #[inline(always)]
-    fn put_down<const N: usize>(&self, frame: &Frame, draw: &Draw, keys: &I<N>, points: &mut Points, at: usize) {
+    fn put_down<const N: usize>(&self, has_map: bool, keys: &I<N>, points: &mut Points, at: usize) {
         let (b, scale) = self.edges.at(keys);
         points.keys[at..at + N].copy_from_slice(&keys.0);
         store(&mut points.position, at, self.positions.at(&b));
         store(&mut points.normal, at, self.normals.at(&b).unit());
-        if let Some((texture, _)) = draw.skin {
-            let [r, g, b, _] = sample::sample(frame.isa, texture, &self.edges.uv(&self.uvs, &b, scale));
-            store(&mut points.diffuse, at, V3::splat(draw.material.diffuse.truncate()) * V3::new(r, g, b));
+        if has_map {
+            let Uv { u, v, right, down } = self.edges.uv(&self.uvs, &b, scale);
+            for (planes, uv) in points.uv.iter_mut().zip([[u, v], right, down]) {
+                uv[0].store(&mut planes[0][at..]);
+                uv[1].store(&mut planes[1][at..]);
+            }
         }
     }
 }
