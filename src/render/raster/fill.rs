@@ -362,14 +362,19 @@ pub(super) trait Visitor<const N: usize> {
 
 /// Takes lanes away that would win.
 pub(super) trait Keep<const N: usize> {
+    /// Whether triangles come in the order in which they were submitted: at equal depth, the one that is there stays.
+    const IN_ORDER: bool;
+
     /// Which of the samples from `at` on that would win do.
     fn keep(&self, at: usize, wins: I<N>) -> I<N>;
 }
 
-/// Everything that would win does.
+/// Everything that would win does: opaque triangles, which are the first to come.
 pub(super) struct All;
 
 impl<const N: usize> Keep<N> for All {
+    const IN_ORDER: bool = true;
+
     #[inline(always)]
     fn keep(&self, _: usize, wins: I<N>) -> I<N> {
         wins
@@ -393,7 +398,10 @@ impl<const N: usize, K: Keep<N>, const LIST: bool> Visitor<N> for Fill<'_, K, LI
         let ids: &mut [u32; N] = (&mut self.ids[at..at + N]).try_into().expect("as many as lanes");
         let id = I::splat(self.id as i32);
         let (old_z, old_id) = (F(*zs), I(ids.map(|id| id as i32)));
-        let wins = inside & (z.gt(old_z) | (z.equal(old_z) & before(id, old_id)));
+        let wins = match K::IN_ORDER {
+            true => inside & z.gt(old_z),
+            false => inside & (z.gt(old_z) | (z.equal(old_z) & before(id, old_id))),
+        };
         if !wins.any() {
             return;
         }

@@ -144,11 +144,11 @@ impl Entries {
         if self.keys.len() < most {
             self.keys.resize(2 * most, 0);
         }
-        let (keys, mut n) = (&mut self.keys[first as usize..most], 0);
+        let (keys, mut n, cut) = (&mut self.keys[first as usize..most], 0, w < TILE);
         for &place in places {
             let place = (place as usize).min(TILE * TILE - 8);
             let mut mask = load(&ids[place..]).equal(I8::splat(id as i32)).bitmask();
-            if place % TILE + 8 > w {
+            if cut && place % TILE + 8 > w {
                 // Eight side by side may reach beyond the picture.
                 mask &= (1 << (w - place % TILE)) - 1;
             }

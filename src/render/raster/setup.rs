@@ -264,10 +264,8 @@ impl Share<'_> {
         if left & !large != 0 {
             self.small(&g, area, left & !large);
         }
-        for k in bits(large) {
-            self.large(first + k, tris[k as usize]);
-        }
-        for k in bits(slow) {
+        // In the order in which they were submitted.
+        for k in bits(large | slow) {
             self.large(first + k, tris[k as usize]);
         }
     }

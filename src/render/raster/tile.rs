@@ -177,6 +177,8 @@ struct Textured<'a> {
 }
 
 impl Keep<8> for Textured<'_> {
+    const IN_ORDER: bool = false;
+
     #[inline(always)]
     fn keep(&self, at: usize, wins: I8) -> I8 {
         let Self { frame, draw, id, corner } = *self;
