@@ -152,14 +152,10 @@ impl Entries {
                 // Eight side by side may reach beyond the picture.
                 mask &= (1 << (w - place % TILE)) - 1;
             }
-            while mask != 0 {
-                let k = mask.trailing_zeros();
-                // What is written beyond the run's end is overwritten by the next.
-                let run = I8::splat(key(place + k as usize, WHOLE)) + I8::IOTA;
-                keys[n..n + 8].copy_from_slice(&run.0);
-                n += (!(mask >> k)).trailing_zeros() as usize;
-                mask &= mask + (1 << k);
-            }
+            // What is written beyond those that are there is overwritten by the next.
+            let run = I8::splat(key(place, WHOLE)) + bits(mask);
+            keys[n..n + 8].copy_from_slice(&run.0);
+            n += mask.count_ones() as usize;
         }
         if n > 0 {
             self.chains.push(Chain { id, count: n as u32, first, slot: 0 });
@@ -291,6 +287,31 @@ fn block(frame: &Frame, area: Area, [x, y]: [usize; 2], scratch: &mut TileScratc
         scratch.entries.push(scratch.entries.shared[k], dense);
     }
     scratch.stats.samples += 4 * whole as u64;
+}
+
+/// The numbers of the bits that are set among the lowest eight, side by side.
+#[inline(always)]
+fn bits(mask: u32) -> I8 {
+    static BITS: [[u8; 8]; 256] = {
+        let (mut table, mut mask) = ([[0; 8]; 256], 0);
+        while mask < 256 {
+            let (mut bit, mut n) = (0, 0);
+            while bit < 8 {
+                if mask >> bit & 1 != 0 {
+                    table[mask][n] = bit as u8;
+                    n += 1;
+                }
+                bit += 1;
+            }
+            mask += 1;
+        }
+        table
+    };
+    let mut numbers = I8::ZERO;
+    for (number, &bit) in numbers.0.iter_mut().zip(&BITS[mask as usize & 255]) {
+        *number = i32::from(bit);
+    }
+    numbers
 }
 
 #[inline(always)]
