@@ -134,21 +134,26 @@ impl WideKernel for Clay<'_> {
     #[inline(always)]
     fn run<const N: usize>(self) {
         let Self { frame, draw, chains, keys, corner, points, colors } = self;
-        let mut n = 0;
-        for chain in chains {
-            let count = chain.count as usize;
-            let keys = &mut keys[chain.first as usize..][..count.next_multiple_of(N)];
-            for k in count..keys.len() {
-                keys[k] = keys[0];
+        let (mut triangles, mut n) = ([Triangle::NONE; 16], 0);
+        for chains in chains.chunks(triangles.len()) {
+            for (chain, triangle) in chains.iter().zip(&mut triangles) {
+                let first = keys[chain.first as usize];
+                *triangle = Triangle::new(frame, draw, chain.id - draw.first_triangle, corner, first);
             }
-            let triangle = Triangle::new(frame, draw, chain.id - draw.first_triangle, corner, keys[0]);
-            for (i, keys) in keys.as_chunks::<N>().0.iter().enumerate() {
-                if n + N > LEN {
-                    simd::run_as::<N, _>(frame.isa, Lit::<N> { frame, draw, points, n, colors });
-                    n = 0;
+            for (chain, triangle) in chains.iter().zip(&triangles) {
+                let count = chain.count as usize;
+                let keys = &mut keys[chain.first as usize..][..count.next_multiple_of(N)];
+                for k in count..keys.len() {
+                    keys[k] = keys[0];
                 }
-                triangle.put_down(draw.skin.is_some(), &I(*keys), points, n);
-                n += (count - i * N).min(N);
+                for (i, keys) in keys.as_chunks::<N>().0.iter().enumerate() {
+                    if n + N > LEN {
+                        simd::run_as::<N, _>(frame.isa, Lit::<N> { frame, draw, points, n, colors });
+                        n = 0;
+                    }
+                    triangle.put_down(draw.skin.is_some(), &I(*keys), points, n);
+                    n += (count - i * N).min(N);
+                }
             }
         }
         simd::run_as::<N, _>(frame.isa, Lit::<N> { frame, draw, points, n, colors });
@@ -214,6 +219,13 @@ struct Triangle {
 }
 
 impl Triangle {
+    const NONE: Self = Self {
+        edges: Edges { e: [[0.0; 3]; 3], pixel: [0.0; 2] },
+        positions: Attribute([Vec3::ZERO; 3]),
+        normals: Attribute([Vec3::ZERO; 3]),
+        uvs: [Vec2::ZERO; 3],
+    };
+
     #[inline(always)]
     fn new(frame: &Frame, draw: &Draw, id: u32, corner: [f32; 2], key: Key) -> Self {
         let t = draw.object.mesh.triangles[id as usize];
