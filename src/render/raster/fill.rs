@@ -301,6 +301,19 @@ impl<const N: usize> Walk<N> {
         let steps = (self.x[1] - first) / wide + 1;
         let x0 = (lane_pixels::<N>(samples) - near_pixels(samples) + I::splat(first)).to_f32();
         let (z_x, wide_x) = (F::splat(self.z_x), F::splat(wide as f32));
+        if narrow {
+            let (z_x0, mut at) = (z_x * x0, (self.y[0] * TILE as i32 + first) as usize);
+            for y in self.y[0]..=self.y[1] {
+                let out = e0 | e1 | e2;
+                if !out.all() {
+                    let z = self.z + (z_x0 + F::splat(self.z_y * y as f32));
+                    visitor.see(at, !out, z.max(lo).min(hi));
+                }
+                (e0, e1, e2) = (e0 + down0, e1 + down1, e2 + down2);
+                at += TILE;
+            }
+            return;
+        }
         for y in self.y[0]..=self.y[1] {
             let (mut f0, mut f1, mut f2) = (e0, e1, e2);
             let (mut at, mut x) = ((y * TILE as i32 + first) as usize * samples, x0);
