@@ -281,7 +281,6 @@ impl<const N: usize> Walk<N> {
         for l in 0..N {
             self.z.0[l] = z[l % 4];
         }
-        self.z = self.z + near_pixels(frame.samples).to_f32() * self.z_x;
     }
 
     /// Visit all samples side by side, as many as lanes, of which one is covered.
@@ -289,20 +288,18 @@ impl<const N: usize> Walk<N> {
     pub fn visit(&self, samples: usize, visitor: &mut impl Visitor<N>) {
         let (lo, hi) = (F::splat(self.z_lo), F::splat(self.z_hi));
         let wide = (N / samples) as i32;
-        // At one sample, what is no wider than the lanes is walked in one column, wherever it starts.
-        let narrow = samples == 1 && self.x[1] - self.x[0] < wide;
-        let first = if narrow { self.x[0].min(TILE as i32 - wide) } else { self.x[0] & -wide };
+        let steps = (self.x[1] - self.x[0]) / wide + 1;
+        let first = self.x[0].min(TILE as i32 - steps * wide);
         let at = |k: usize| self.e[k] + I::splat(self.step_x[k] * first + self.step_y[k] * self.y[0]);
         let (mut e0, mut e1, mut e2) = (at(0), at(1), at(2));
         let across = |k: usize| I::splat(self.step_x[k] * wide);
         let (across0, across1, across2) = (across(0), across(1), across(2));
         let down = |k: usize| I::splat(self.step_y[k]);
         let (down0, down1, down2) = (down(0), down(1), down(2));
-        let steps = (self.x[1] - first) / wide + 1;
-        let x0 = (lane_pixels::<N>(samples) - near_pixels(samples) + I::splat(first)).to_f32();
+        let x0 = (lane_pixels::<N>(samples) + I::splat(first)).to_f32();
         let (z_x, wide_x) = (F::splat(self.z_x), F::splat(wide as f32));
-        if narrow {
-            let (z_x0, mut at) = (z_x * x0, (self.y[0] * TILE as i32 + first) as usize);
+        if steps == 1 {
+            let (z_x0, mut at) = (z_x * x0, (self.y[0] * TILE as i32 + first) as usize * samples);
             for y in self.y[0]..=self.y[1] {
                 let out = e0 | e1 | e2;
                 if !out.all() {
@@ -310,7 +307,7 @@ impl<const N: usize> Walk<N> {
                     visitor.see(at, !out, z.max(lo).min(hi));
                 }
                 (e0, e1, e2) = (e0 + down0, e1 + down1, e2 + down2);
-                at += TILE;
+                at += TILE * samples;
             }
             return;
         }
@@ -441,12 +438,6 @@ fn before<const N: usize>(a: I<N>, b: I<N>) -> I<N> {
 #[inline(always)]
 pub(super) fn lane_pixels<const N: usize>(samples: usize) -> I<N> {
     if samples == 1 { I::IOTA } else { I::IOTA.shift_right(2) }
-}
-
-/// The pixel of each lane within the eight that it belongs to: depths are rounded alike, however many eights there are.
-#[inline(always)]
-fn near_pixels<const N: usize>(samples: usize) -> I<N> {
-    if samples == 1 { I::IOTA } else { I::IOTA.shift_right(2) & I::splat(1) }
 }
 
 /// Where each lane's sample lies, in 1/256 pixels from the first pixel's centre.
