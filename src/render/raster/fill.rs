@@ -24,34 +24,50 @@ pub(super) struct Visibility {
     pub places: Places,
 }
 
-/// Where triangles won, at one sample a pixel: what is seen of them is seen there.
+/// Where triangles won: what is seen of them is seen there.
 #[derive(Debug, Default)]
 pub(super) struct Places {
-    /// The first of eight samples side by side.
+    /// The first of samples side by side.
     at: Vec<u16>,
-    /// Triangles in the order in which they were drawn, and where their places end.
-    of: Vec<(u32, u32)>,
+    /// Triangles in the order in which they were drawn.
+    of: Vec<Of>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Of {
+    id: u32,
+    /// Where its places end.
+    end: u32,
+    /// How many samples each is of.
+    lanes: u32,
+}
+
+/// Where one of them won.
+pub(super) struct Won<'a> {
+    pub id: u32,
+    pub places: &'a [u16],
+    pub lanes: usize,
 }
 
 /// Places that one triangle can have in a tile.
-const MOST: usize = TILE * TILE / 8;
+const MOST: usize = 4 * TILE * TILE / 8;
 
-/// From so many on, places where nothing is seen any more are dropped: 4096 are left at most.
+/// From so many on, places where nothing is seen any more are dropped: one a sample is left at most.
 const MANY: usize = 1 << 15;
 
 impl Places {
-    /// Triangles, and where they may be seen.
-    pub fn iter(&self) -> impl Iterator<Item = (u32, &[u16])> {
+    /// Where triangles may be seen.
+    pub fn iter(&self) -> impl Iterator<Item = Won<'_>> {
         let mut start = 0;
-        self.of.iter().map(move |&(id, end)| {
-            let places = &self.at[start..end as usize];
-            start = end as usize;
-            (id, places)
+        self.of.iter().map(move |of| {
+            let places = &self.at[start..of.end as usize];
+            start = of.end as usize;
+            Won { id: of.id, places, lanes: of.lanes as usize }
         })
     }
 
     fn end(&self) -> usize {
-        self.of.last().map_or(0, |l| l.1 as usize)
+        self.of.last().map_or(0, |l| l.end as usize)
     }
 
     /// Room for a triangle's places, and where it starts.
@@ -68,15 +84,15 @@ impl Places {
     fn make_room(&mut self, seen: &[u32]) -> usize {
         if self.at.len() >= MANY {
             let (mut from, mut to) = (0, 0);
-            for (id, end) in &mut self.of {
-                for k in from..*end as usize {
+            for of in &mut self.of {
+                for k in from..of.end as usize {
                     let at = self.at[k];
-                    if seen[at as usize..][..8].contains(id) {
+                    if seen[at as usize..][..of.lanes as usize].contains(&of.id) {
                         self.at[to] = at;
                         to += 1;
                     }
                 }
-                (from, *end) = (*end as usize, to as u32);
+                (from, of.end) = (of.end as usize, to as u32);
             }
         }
         let end = self.end();
@@ -333,33 +349,23 @@ impl<const N: usize> Walk<N> {
         }
     }
 
-    /// Draw into the buffer: nearer wins, at equal depth the triangle that was submitted first.
+    /// Draw into the buffer, and list where it won: nearer wins, at equal depth the triangle that was submitted first.
     #[inline(always)]
     pub fn fill(&self, samples: usize, v: &mut Visibility, keep: impl Keep<N>) {
         v.touch(self.x, self.y);
         let (z, ids) = (&mut v.z[..], &mut v.id[..]);
-        self.visit(samples, &mut Fill::<_, false> { z, ids, id: self.id, keep, places: &mut [], n: 0 });
+        let (start, places) = v.places.room(ids);
+        let mut fill = Fill { z, ids, id: self.id, keep, places, n: 0 };
+        self.visit(samples, &mut fill);
+        if fill.n > 0 {
+            let end = (start + fill.n) as u32;
+            v.places.of.push(Of { id: self.id, end, lanes: N as u32 });
+        }
     }
 
     /// Depth at a pixel's centre in the tile.
     pub fn depth_at(&self, x: i32, y: i32) -> f32 {
         (self.z_center + self.z_x * x as f32 + self.z_y * y as f32).max(self.z_lo).min(self.z_hi)
-    }
-}
-
-impl Walk<8> {
-    /// The same at one sample a pixel, and list where it won.
-    #[inline(always)]
-    pub fn fill_and_list(&self, v: &mut Visibility, keep: impl Keep<8>) {
-        v.touch(self.x, self.y);
-        let (z, ids) = (&mut v.z[..], &mut v.id[..]);
-        let (start, places) = v.places.room(ids);
-        let mut fill = Fill::<_, true> { z, ids, id: self.id, keep, places, n: 0 };
-        self.visit(1, &mut fill);
-        if fill.n > 0 {
-            let end = (start + fill.n) as u32;
-            v.places.of.push((self.id, end));
-        }
     }
 }
 
@@ -391,8 +397,7 @@ impl<const N: usize> Keep<N> for All {
     }
 }
 
-/// `LIST`: note where the triangle wins.
-struct Fill<'a, K, const LIST: bool> {
+struct Fill<'a, K> {
     z: &'a mut [f32],
     ids: &'a mut [u32],
     id: u32,
@@ -401,7 +406,7 @@ struct Fill<'a, K, const LIST: bool> {
     n: usize,
 }
 
-impl<const N: usize, K: Keep<N>, const LIST: bool> Visitor<N> for Fill<'_, K, LIST> {
+impl<const N: usize, K: Keep<N>> Visitor<N> for Fill<'_, K> {
     #[inline(always)]
     fn see(&mut self, at: usize, inside: I<N>, z: F<N>) {
         let zs: &mut [f32; N] = (&mut self.z[at..at + N]).try_into().expect("as many as lanes");
@@ -418,12 +423,10 @@ impl<const N: usize, K: Keep<N>, const LIST: bool> Visitor<N> for Fill<'_, K, LI
         let wins = self.keep.keep(at, wins);
         *zs = wins.select(z, old_z).0;
         *ids = wins.select_int(id, old_id).0.map(|id| id as u32);
-        if LIST {
-            if let Some(place) = self.places.get_mut(self.n) {
-                *place = at as u16;
-            }
-            self.n += 1;
+        if let Some(place) = self.places.get_mut(self.n) {
+            *place = at as u16;
         }
+        self.n += 1;
     }
 }
 

@@ -87,11 +87,7 @@ pub(super) fn resolve(
     scratch.colors.start(sink, frame.samples, frame.scene.background);
     // What was found for another scene means nothing here.
     scratch.last_draw = LastDraw::default();
-    if frame.samples == 1 {
-        scan::look(bins, tile, area, scratch);
-    } else {
-        scan::scan(frame, area, scratch);
-    }
+    scan::look(frame, bins, tile, area, scratch);
     let mut k = 0;
     while k < scratch.entries.chains.len() {
         k = chain(frame, area, k, scratch);
@@ -131,7 +127,8 @@ fn chain(frame: &Frame, area: Area, k: usize, scratch: &mut TileScratch) -> usiz
         }
         done += n as u32;
         let keys = keys.as_chunks::<8>().0;
-        Shade::<true> { frame, draw, ids: &ids, known: &known, found: &mut [], keys, corner, out: shades }.colors();
+        Shade::<true> { frame, draw, ids: &ids, known: &known, found: &mut [], keys, corner, out: shades }
+            .colors();
         for (i, keys) in keys.iter().enumerate() {
             colors.put(&I(*keys), (n - 8 * i).min(8), &shades.batch(i));
         }

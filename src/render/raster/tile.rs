@@ -76,7 +76,7 @@ impl Row<'_, '_> {
         self.scratch.seen.start(frame.samples);
         let opaque = Opaque { frame, bins: self.bins, index, area, seen: &mut self.scratch.seen };
         if frame.samples == 1 {
-            opaque.fill_and_list();
+            opaque.fill();
         } else {
             simd::run_wide(frame.isa, opaque);
         }
@@ -114,10 +114,7 @@ impl Row<'_, '_> {
                 let draw = &frame.draws[setup.draw as usize];
                 let id = setup.id - draw.first_triangle;
                 let keep = Textured { frame, draw, id, corner: area.corner(frame) };
-                match frame.samples {
-                    1 => walk.fill_and_list(seen, keep),
-                    n => walk.fill(n, seen, keep),
-                }
+                walk.fill(frame.samples, seen, keep);
             }
         }
     }
@@ -135,14 +132,14 @@ struct Opaque<'a> {
 impl Opaque<'_> {
     /// One sample a pixel: few triangles are wider than eight.
     #[inline(always)]
-    fn fill_and_list(self) {
+    fn fill(self) {
         let Self { frame, bins, index, area, seen } = self;
         for bins in bins {
             for setup in bins.solid(index) {
                 if !frame.is_masked(setup)
-                    && let Some(walk) = Walk::new(frame, setup, area.origin)
+                    && let Some(walk) = Walk::<8>::new(frame, setup, area.origin)
                 {
-                    walk.fill_and_list(seen, All);
+                    walk.fill(1, seen, All);
                 }
             }
         }
