@@ -289,12 +289,19 @@ impl<const N: usize> I<N> {
     /// Any sign set.
     #[inline(always)]
     pub fn any(self) -> bool {
+        if N > 8 {
+            // One instruction where the lanes are of comparisons.
+            return self.0.iter().fold(0, |a, b| a | b) < 0;
+        }
         self.fours(|a, b| a | b) != 0
     }
 
     /// All signs set.
     #[inline(always)]
     pub fn all(self) -> bool {
+        if N > 8 {
+            return self.0.iter().fold(-1, |a, b| a & b) < 0;
+        }
         self.fours(|a, b| a & b) == 0xf
     }
 

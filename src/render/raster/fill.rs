@@ -317,10 +317,10 @@ impl<const N: usize> Walk<N> {
         if steps == 1 {
             let (z_x0, mut at) = (z_x * x0, (self.y[0] * TILE as i32 + first) as usize * samples);
             for y in self.y[0]..=self.y[1] {
-                let out = e0 | e1 | e2;
-                if !out.all() {
+                let inside = is_inside(e0, e1, e2);
+                if inside.any() {
                     let z = self.z + (z_x0 + F::splat(self.z_y * y as f32));
-                    visitor.see(at, !out, z.max(lo).min(hi));
+                    visitor.see(at, inside, z.max(lo).min(hi));
                 }
                 (e0, e1, e2) = (e0 + down0, e1 + down1, e2 + down2);
                 at += TILE * samples;
@@ -333,10 +333,10 @@ impl<const N: usize> Walk<N> {
             let z_y = F::splat(self.z_y * y as f32);
             let mut met = false;
             for _ in 0..steps {
-                let out = f0 | f1 | f2;
-                if !out.all() {
+                let inside = is_inside(f0, f1, f2);
+                if inside.any() {
                     let z = self.z + (z_x * x + z_y);
-                    visitor.see(at, !out, z.max(lo).min(hi));
+                    visitor.see(at, inside, z.max(lo).min(hi));
                     met = true;
                 } else if met && samples == 1 {
                     // Of one sample a pixel, those of a row that lie within follow each other.
@@ -428,6 +428,13 @@ impl<const N: usize, K: Keep<N>> Visitor<N> for Fill<'_, K> {
         }
         self.n += 1;
     }
+}
+
+/// Where no edge function is negative.
+#[inline(always)]
+fn is_inside<const N: usize>(e0: I<N>, e1: I<N>, e2: I<N>) -> I<N> {
+    let out = e0 | e1 | e2;
+    if N > 8 { out.gt(I::splat(-1)) } else { !out }
 }
 
 /// Unsigned `a < b`.
