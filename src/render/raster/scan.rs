@@ -99,8 +99,13 @@ impl Entries {
     /// List the pixels of a tile, `w` wide, that show a triangle among those where it won, and its parts of others; the number of whole
     /// ones.
     #[inline(always)]
-    fn find<const SAMPLES: usize>(&mut self, ids: &[u32; 4 * TILE * TILE], w: usize, won: &Won) -> usize {
-        let Won { id, places, lanes } = *won;
+    fn find<const SAMPLES: usize, const LANES: usize>(
+        &mut self,
+        ids: &[u32; 4 * TILE * TILE],
+        w: usize,
+        won: &Won,
+    ) -> usize {
+        let Won { id, places, .. } = *won;
         let last = self.chains.last().copied();
         let first = last.map_or(0, |c| c.first + c.count + ROOM as u32);
         let most = first as usize + 8 * places.len() + self.parts.len() + ROOM;
@@ -110,10 +115,10 @@ impl Entries {
         let (keys, mut n, cut) = (&mut self.keys[first as usize..most], 0, w < TILE);
         let shows = |at: usize| load(&ids[at..]).equal(I8::splat(id as i32)).bitmask();
         for &at in places {
-            let at = (at as usize).min(SAMPLES * TILE * TILE - lanes);
+            let at = (at as usize).min(SAMPLES * TILE * TILE - LANES);
             let mut mask = shows(at);
             if SAMPLES == 4 {
-                mask |= if lanes == 16 { shows(at + 8) << 8 } else { 0 };
+                mask |= if LANES == 16 { shows(at + 8) << 8 } else { 0 };
                 let whole = mask & mask >> 1;
                 let whole = whole & whole >> 2;
                 // Every fourth bit, side by side.
@@ -187,7 +192,11 @@ fn list<const SAMPLES: usize>(bins: &[Bins], tile: usize, area: Area, scratch: &
     entries.parts.sort_unstable();
     let ids: &mut [u32; 4 * TILE * TILE] = (&mut seen.id[..4 * TILE * TILE]).try_into().expect("a tile");
     for won in seen.places.iter() {
-        stats.samples += (SAMPLES * entries.find::<SAMPLES>(ids, area.w, &won)) as u64;
+        let whole = match won.lanes {
+            16 => entries.find::<SAMPLES, 16>(ids, area.w, &won),
+            _ => entries.find::<SAMPLES, 8>(ids, area.w, &won),
+        };
+        stats.samples += (SAMPLES * whole) as u64;
     }
     for k in 0..entries.parts.len() {
         let part = entries.parts[k];
