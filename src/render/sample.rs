@@ -21,7 +21,7 @@ pub(crate) struct Uv<const N: usize = 8> {
     pub down: [F<N>; 2],
 }
 
-impl Uv {
+impl<const N: usize> Uv<N> {
     pub const ZERO: Self = Self { u: F::ZERO, v: F::ZERO, right: [F::ZERO; 2], down: [F::ZERO; 2] };
 }
 
@@ -30,6 +30,41 @@ impl Uv {
 /// The level is `log₂` of the longer side of the pixel's footprint in texels.
 pub(crate) fn sample<const N: usize>(isa: Isa, texture: &Texture, uv: &Uv<N>) -> [F<N>; 4] {
     simd::run_as::<N, _>(isa, Lookup { texture, uv })
+}
+
+/// Batches of lanes for [`sample_all`].
+pub(crate) const AT_ONCE: usize = 4;
+
+/// The same for up to [`AT_ONCE`] batches: what is fetched for one of them is on its way while others are asked for.
+pub(crate) fn sample_all<const N: usize>(isa: Isa, texture: &Texture, uvs: &[Uv<N>], out: &mut [[F<N>; 4]]) {
+    simd::run_as::<N, _>(isa, Lookups { texture, uvs, out })
+}
+
+struct Lookups<'a, const N: usize> {
+    texture: &'a Texture,
+    uvs: &'a [Uv<N>],
+    out: &'a mut [[F<N>; 4]],
+}
+
+impl<const N: usize> Kernel for Lookups<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { texture, uvs, out } = self;
+        let levels = texture.packed().filter(|_| texture.filter() != Filter::Nearest);
+        let Some(levels) = levels else {
+            return out.iter_mut().zip(uvs).for_each(|(out, uv)| *out = filtered(texture, uv));
+        };
+        let mut taps = [Taps::NONE; AT_ONCE];
+        for (taps, uv) in taps.iter_mut().zip(uvs) {
+            taps.fetch(texture, levels, uv);
+        }
+        let taps = std::hint::black_box(&taps);
+        for (out, taps) in out.iter_mut().zip(taps) {
+            *out = taps.sum();
+        }
+    }
 }
 
 struct Lookup<'a, const N: usize> {
@@ -48,42 +83,46 @@ impl<const N: usize> Kernel for Lookup<'_, N> {
 
 #[inline(always)]
 fn filtered<const N: usize>(t: &Texture, uv: &Uv<N>) -> [F<N>; 4] {
-    let top = (t.levels().len() - 1) as f32;
-    let lod = if top > 0.0 { lod(t, uv).max(F::ZERO).min(F::splat(top)) } else { F::ZERO };
+    let lod = lod(t, uv);
     if t.filter() == Filter::Nearest {
         return nearest(t, uv, lod.round());
     }
-    let level = lod.floor();
-    let fraction = lod - level.to_f32();
-    let next = (level + I::splat(1)).min(I::splat(top as i32));
-    let blended = fraction.gt(F::ZERO).any();
-    let mut sum = [F::ZERO; 4];
     if let Some(levels) = t.packed() {
-        add_packed(t, levels, uv, level, F::ONE - fraction, &mut sum);
-        if blended {
-            add_packed(t, levels, uv, next, fraction, &mut sum);
-        }
-        for c in 0..3 {
-            sum[c] = sum[c] * (1.0 / (PACKED[c] * PACKED[c]));
-        }
-        return [sum[0], sum[1], sum[2], F::ONE];
+        let mut taps = Taps::NONE;
+        taps.fetch(t, levels, uv);
+        return std::hint::black_box(&taps).sum();
     }
+    let (level, next, fraction) = between(t, lod);
+    let mut sum = [F::ZERO; 4];
     add_wide(t, uv, level, F::ONE - fraction, &mut sum);
-    if blended {
+    if fraction.gt(F::ZERO).any() {
         add_wide(t, uv, next, fraction, &mut sum);
     }
     sum
 }
 
+/// The two levels that a level of detail lies between, and how far it is from the first.
+#[inline(always)]
+fn between<const N: usize>(t: &Texture, lod: F<N>) -> (I<N>, I<N>, F<N>) {
+    let level = lod.floor();
+    let last = I::splat(t.levels().len() as i32 - 1);
+    (level, (level + I::splat(1)).min(last), lod - level.to_f32())
+}
+
 #[inline(always)]
 fn lod<const N: usize>(t: &Texture, uv: &Uv<N>) -> F<N> {
+    let top = (t.levels().len() - 1) as f32;
+    if top <= 0.0 {
+        return F::ZERO;
+    }
     let (w, h) = (t.width() as f32, t.height() as f32);
     let square = |d: [F<N>; 2]| {
         let (x, y) = (d[0] * w, d[1] * h);
         x * x + y * y
     };
     let footprint = square(uv.right).max(square(uv.down));
-    power::log2(footprint.max(F::splat(1e-12)).min(F::splat(1e12))) * 0.5
+    let lod = power::log2(footprint.max(F::splat(1e-12)).min(F::splat(1e12))) * 0.5;
+    lod.max(F::ZERO).min(F::splat(top))
 }
 
 /// Sizes of each lane's level along one side.
@@ -199,67 +238,99 @@ fn around<const N: usize>(
     ([y0 * stride + x, y1 * stride + x], [[upper * left, upper * fx], [lower * left, lower * fx]])
 }
 
-/// Add `weight` times the four texels around each point, in squares of packed values.
+/// The texels around points, packed values, and their weights.
 ///
 /// A channel is decoded by one product, and a level takes half the memory of one in linear light, which matters most: texels
-/// come from far away.
-#[inline(always)]
-fn add_packed<const N: usize>(
-    t: &Texture,
-    levels: &[Level<u32>],
-    uv: &Uv<N>,
-    level: I<N>,
-    weight: F<N>,
-    sum: &mut [F<N>; 4],
-) {
-    let same = level.equal(I::splat(level.0[0])).all();
-    let (at, weights) = around(t, uv, level, same, weight);
-    let (mut whole, mut all) = ([&[][..]; N], true);
-    for k in 0..if same { 1 } else { N } {
-        let texels = levels[level.0[k] as usize].whole();
-        (whole[k], all) = (texels.unwrap_or_default(), all & texels.is_some());
+/// come from far away. They go through memory, and wait there as long as they can: what is taken apart right from single numbers becomes
+/// vector instructions in parts only.
+struct Taps<const N: usize> {
+    /// Texels and their right neighbours: of the upper row and the lower, of one level or two.
+    words: [[u64; N]; 4],
+    weights: [[F<N>; 2]; 4],
+    rows: usize,
+}
+
+impl<const N: usize> Taps<N> {
+    const NONE: Self = Self { words: [[0; N]; 4], weights: [[F::ZERO; 2]; 4], rows: 0 };
+
+    #[inline(always)]
+    fn fetch(&mut self, t: &Texture, levels: &[Level<u32>], uv: &Uv<N>) {
+        let (level, next, fraction) = between(t, lod(t, uv));
+        self.fetch_level(t, levels, uv, level, F::ONE - fraction, 0);
+        self.rows = 2;
+        if fraction.gt(F::ZERO).any() {
+            self.fetch_level(t, levels, uv, next, fraction, 2);
+            self.rows = 4;
+        }
     }
-    for j in 0..2 {
-        let [left, right] = match (all, same) {
-            (true, true) => pairs::<true, N>(&whole, at[j]),
-            (true, false) => pairs::<false, N>(&whole, at[j]),
-            _ => single(t, levels, level, at[j]),
-        };
-        add_squares(sum, left, weights[j][0]);
-        add_squares(sum, right, weights[j][1]);
+
+    #[inline(always)]
+    fn fetch_level(
+        &mut self,
+        t: &Texture,
+        levels: &[Level<u32>],
+        uv: &Uv<N>,
+        level: I<N>,
+        weight: F<N>,
+        row: usize,
+    ) {
+        let same = level.equal(I::splat(level.0[0])).all();
+        let (at, weights) = around(t, uv, level, same, weight);
+        let (mut whole, mut all) = ([&[][..]; N], true);
+        for k in 0..if same { 1 } else { N } {
+            let texels = levels[level.0[k] as usize].whole();
+            (whole[k], all) = (texels.unwrap_or_default(), all & texels.is_some());
+        }
+        for j in 0..2 {
+            self.weights[row + j] = weights[j];
+            let words = &mut self.words[row + j];
+            match (all, same) {
+                (true, true) => pairs::<true, N>(&whole, at[j], words),
+                (true, false) => pairs::<false, N>(&whole, at[j], words),
+                _ => single(t, levels, level, at[j], words),
+            }
+        }
+    }
+
+    /// Linear colours.
+    #[inline(always)]
+    fn sum(&self) -> [F<N>; 4] {
+        let mut sum = [F::ZERO; 4];
+        for (words, weights) in self.words.iter().zip(&self.weights).take(self.rows) {
+            let (mut left, mut right) = (I::ZERO, I::ZERO);
+            for k in 0..N {
+                (left.0[k], right.0[k]) = (words[k] as i32, (words[k] >> 32) as i32);
+            }
+            add_squares(&mut sum, left, weights[0]);
+            add_squares(&mut sum, right, weights[1]);
+        }
+        for c in 0..3 {
+            sum[c] = sum[c] * (1.0 / (PACKED[c] * PACKED[c]));
+        }
+        [sum[0], sum[1], sum[2], F::ONE]
     }
 }
 
 /// Texels and their right neighbours, of one level if it is the `SAME`.
 #[inline(always)]
-fn pairs<const SAME: bool, const N: usize>(levels: &[&[u32]; N], at: I<N>) -> [I<N>; 2] {
-    let mut words = [0u64; N];
+fn pairs<const SAME: bool, const N: usize>(levels: &[&[u32]; N], at: I<N>, out: &mut [u64; N]) {
     for k in 0..N {
         let first = at.0[k] as u32 as usize;
         let pair = &levels[if SAME { 0 } else { k }][first..first + 2];
-        words[k] = u64::from(pair[0]) | u64::from(pair[1]) << 32;
+        out[k] = u64::from(pair[0]) | u64::from(pair[1]) << 32;
     }
-    // Through memory: what is taken apart right from single numbers becomes vector instructions in parts only.
-    let words = std::hint::black_box(words);
-    let (mut left, mut right) = (I::ZERO, I::ZERO);
-    for k in 0..N {
-        (left.0[k], right.0[k]) = (words[k] as i32, (words[k] >> 32) as i32);
-    }
-    [left, right]
 }
 
 /// The same where not all levels are decoded.
 #[inline(never)]
-fn single<const N: usize>(t: &Texture, levels: &[Level<u32>], level: I<N>, at: I<N>) -> [I<N>; 2] {
-    let (mut left, mut right) = (I::ZERO, I::ZERO);
+fn single<const N: usize>(t: &Texture, levels: &[Level<u32>], level: I<N>, at: I<N>, out: &mut [u64; N]) {
     for k in 0..N {
         let number = level.0[k] as usize;
         let pair = levels[number].pair(t, number, at.0[k] as u32 as usize);
-        (left.0[k], right.0[k]) = (pair[0] as i32, pair[1] as i32);
+        out[k] = u64::from(pair[0]) | u64::from(pair[1]) << 32;
     }
     // That the lanes mostly agree in their level is good enough for a count.
     levels[level.0[0] as usize].count(t, level.0[0] as usize, 2 * N);
-    [left, right]
 }
 
 #[inline(always)]

@@ -179,9 +179,16 @@ impl<const N: usize> Kernel for Lit<'_, N> {
         if let Some((texture, _)) = draw.skin {
             points.repeat_last::<N>(n);
             let k_d = V3::splat(draw.material.diffuse.truncate());
-            for at in (0..n).step_by(N) {
-                let [r, g, b, _] = sample::sample(frame.isa, texture, &points.uv::<N>(at));
-                store(&mut points.diffuse, at, k_d * V3::new(r, g, b));
+            let (mut uvs, mut texels) = ([Uv::<N>::ZERO; sample::AT_ONCE], [[F::ZERO; 4]; sample::AT_ONCE]);
+            for first in (0..n).step_by(N * sample::AT_ONCE) {
+                let batches = (n - first).div_ceil(N).min(sample::AT_ONCE);
+                for (i, uv) in uvs[..batches].iter_mut().enumerate() {
+                    *uv = points.uv(first + N * i);
+                }
+                sample::sample_all(frame.isa, texture, &uvs[..batches], &mut texels[..batches]);
+                for (i, [r, g, b, _]) in texels[..batches].iter().enumerate() {
+                    store(&mut points.diffuse, first + N * i, k_d * V3::new(*r, *g, *b));
+                }
             }
         }
         for at in (0..n).step_by(N) {
