@@ -366,3 +366,39 @@ fn add_wide<const N: usize>(t: &Texture, uv: &Uv<N>, level: I<N>, weight: F<N>, 
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Content, Texture};
+    use crate::test_rng::Rng;
+
+    #[test]
+    fn batches_at_once_are_what_each_is() {
+        let mut rng = Rng::new(7);
+        let noise: Vec<u8> = (0..4 * 37 * 20).map(|_| rng.range(0.0, 256.0) as u8).collect();
+        let opaque = noise.chunks(4).flat_map(|p| [p[0], p[1], p[2], 255]).collect::<Vec<u8>>();
+        for (texels, filter) in
+            [(&opaque, Filter::Trilinear), (&noise, Filter::Trilinear), (&opaque, Filter::Nearest)]
+        {
+            let t = Texture::new(37, 20, texels.clone(), Content::Color, [WrapMode::Repeat; 2], filter)
+                .expect("it fits");
+            for batches in 1..=AT_ONCE {
+                let mut number = |lo: f64, hi: f64| F::<8>([0.0; 8].map(|_: f32| rng.range(lo, hi) as f32));
+                let uvs: Vec<Uv<8>> = (0..batches)
+                    .map(|_| {
+                        let [u, v] = [number(-2.0, 2.0), number(-2.0, 2.0)];
+                        // Footprints of a tenth of a texel to all of them.
+                        let right = [number(0.001, 1.5), number(-0.1, 0.1)];
+                        Uv { u, v, right, down: [F::ZERO, number(0.001, 0.2)] }
+                    })
+                    .collect();
+                let mut found = vec![[F::ZERO; 4]; batches];
+                sample_all(Isa::Best, &t, &uvs, &mut found);
+                for (found, uv) in found.iter().zip(&uvs) {
+                    assert_eq!(*found, sample(Isa::Portable, &t, uv), "{filter:?}");
+                }
+            }
+        }
+    }
+}

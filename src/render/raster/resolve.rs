@@ -1,6 +1,7 @@
 //! From visible triangles to colours, eight evaluations at a time.
 //!
-//! Triangles with enough pixels in the tile are shaded by themselves; what is left over is shaded in order of material.
+//! Triangles of [clay](super::clay) share their lanes; of others those with enough pixels in the tile are shaded by themselves; what is left
+//! over is shaded in order of material.
 
 use super::clay::Clay;
 use super::colors::{Colors, Sink};

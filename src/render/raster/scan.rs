@@ -122,7 +122,7 @@ impl Entries {
                 let whole = mask & mask >> 1;
                 let whole = whole & whole >> 2;
                 // Every fourth bit, side by side.
-                mask = (whole & 0x1111) * 0x1248 >> 12 & 0xf;
+                mask = ((whole & 0x1111) * 0x1248) >> 12 & 0xf;
             }
             let place = at / SAMPLES;
             if cut && place % TILE + 8 > w {
