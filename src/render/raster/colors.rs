@@ -42,6 +42,7 @@ pub(super) struct Colors {
 
 impl Colors {
     /// Start a tile over the background.
+    #[inline(always)]
     pub fn start(&mut self, sink: Sink, samples: usize, background: [f32; 4]) {
         (self.sink, self.samples) = (sink, samples);
         self.shared.clear();

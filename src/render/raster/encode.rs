@@ -72,6 +72,7 @@ impl Target<'_> {
     }
 
     /// Write a tile that starts at column `x` and is `w` pixels wide.
+    #[inline(always)]
     pub fn write(&mut self, x: usize, w: usize, colors: &Colors) {
         let rows = self.rows();
         match self {

@@ -152,7 +152,7 @@ impl Visibility {
         }
     }
 
-    #[inline(never)]
+    #[inline(always)]
     fn clear(&mut self, blocks: u64) {
         self.touched |= blocks;
         let (z, id) = (self.z.as_chunks_mut::<8>().0, self.id.as_chunks_mut::<8>().0);
