@@ -243,4 +243,19 @@ fn equal_depths_go_to_the_first() {
     let mut stage = Stage::of(from_front(5.0, 2.0), both[0].clone(), material(Vec4::ONE));
     stage.meshes.push((both[1].clone(), 0));
     assert!(stage.ids(32).0.objects.iter().all(|&o| o == 1));
+
+    // Of one mesh, too, where one is so long that it takes another way than the other.
+    let ring = |r: f32| [Vec3::new(-r, -r, 0.0), Vec3::new(r, -r, 0.0), Vec3::new(0.0, r, 0.0)];
+    for (outer, inner) in [(0, 1), (1, 0)] {
+        let mut corners = [ring(0.9); 2];
+        corners[inner] = ring(0.1);
+        let both = mesh(corners.concat(), vec![[0, 1, 2], [3, 4, 5]]);
+        let stage = Stage::of(from_front(5.0, 2.0), both, material(Vec4::ONE));
+        let count = |ids: &IdImage, t| {
+            ids.objects.iter().zip(&ids.triangles).filter(|&(&o, &found)| o == 1 && found == t).count()
+        };
+        let ids = stage.ids(256).0;
+        assert!(count(&ids, outer as u32) > 20_000, "the outer covers 200 pixels each way");
+        assert_eq!(count(&ids, inner as u32) > 0, inner == 0, "the inner is seen if it comes first");
+    }
 }

@@ -208,16 +208,22 @@ fn layers_drawn_from_back_to_front_and_parts_of_clipped_triangles_are_shaded_onc
         stage.meshes.push((Mesh::new(quad(1.0, 0.001 * k as f32)).unwrap(), k));
         stage.materials.push(material(Vec4::new(0.0, f32::from(u8::from(k == 199)), 0.5, 1.0)));
     }
-    let (picture, stats) = stage.bytes(128, 1);
-    assert!(picture.data.chunks(4).all(|p| p == &picture.data[..4] && p[1] == 255));
-    assert_eq!((stats.samples, stats.shaded), (128 * 128, 128 * 128));
+    for samples in [1, 4] {
+        let (picture, stats) = stage.bytes(128, samples);
+        assert!(picture.data.chunks(4).all(|p| p == &picture.data[..4] && p[1] == 255));
+        assert_eq!((stats.samples, stats.shaded), (u64::from(samples) * 128 * 128, 128 * 128));
+    }
 
     // A floor that runs behind the eye is cut into parts.
     let positions = [[-9.0, -1.0, 4.0], [9.0, -1.0, 4.0], [0.0, -1.0, -30.0]].map(Vec3::from_array).to_vec();
     let camera = perspective(Vec3::new(0.0, 0.0, 2.0), Vec3::ZERO, 1.4);
     let floor = Stage::of(camera, mesh(positions, vec![[0, 1, 2]]), material(Vec4::ONE));
-    let (picture, stats) = floor.bytes(150, 1);
-    let seen = picture.data.chunks(4).filter(|p| p[3] == 255).count() as u64;
-    assert!(stats.clipped == 1 && seen > 5000);
-    assert_eq!((stats.samples, stats.shaded), (seen, seen));
+    for samples in [1, 4] {
+        let (picture, stats) = floor.bytes(150, samples);
+        let seen = || picture.data.chunks(4).filter(|p| p[3] > 0);
+        // 64, 128, 191 and 255 are one to four of four samples.
+        let covered: u64 = seen().map(|p| (u64::from(p[3]) + 1) / 64 * u64::from(samples) / 4).sum();
+        assert!(stats.clipped == 1 && seen().count() > 5000);
+        assert_eq!((stats.samples, stats.shaded), (covered, seen().count() as u64), "{samples} samples");
+    }
 }
