@@ -412,12 +412,6 @@ pub fn run_wide<K: WideKernel>(isa: Isa, kernel: K) -> K::Output {
     if isa == Isa::Best && *HAS_AVX512 {
         return run_as::<16, _>(isa, Wide::<K, 16>(kernel));
     }
-    run_narrow(isa, kernel)
-}
-
-/// Run a kernel with eight lanes, where there is no work for more.
-#[inline]
-pub fn run_narrow<K: WideKernel>(isa: Isa, kernel: K) -> K::Output {
     run(isa, Wide::<K, 8>(kernel))
 }
 

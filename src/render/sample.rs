@@ -52,6 +52,7 @@ impl<const N: usize> Kernel for Lookups<'_, N> {
     #[inline(always)]
     fn run(self) {
         let Self { texture, uvs, out } = self;
+        debug_assert!(uvs.len() <= AT_ONCE && uvs.len() == out.len());
         let levels = texture.packed().filter(|_| texture.filter() != Filter::Nearest);
         let Some(levels) = levels else {
             return out.iter_mut().zip(uvs).for_each(|(out, uv)| *out = filtered(texture, uv));
