@@ -49,6 +49,14 @@ pub enum Past {
         /// The bound of their number.
         most: usize,
     },
+    /// Light is not the same, where no bound allows it.
+    #[error(
+        "linear light differs, by less than a code anywhere (PSNR {found:.2} dB), expected the same; a bound of 0 codes compares codes alone"
+    )]
+    Light {
+        /// Peak signal to noise of the light.
+        found: f64,
+    },
 }
 
 /// Two frames that were compared.
@@ -126,7 +134,9 @@ impl Tolerance {
         let (codes, most) = (self.codes.unwrap_or(0), self.pixels.unwrap_or(0));
         let found = c.difference.beyond(codes);
         // Without any bound light must be the same too, below what codes can tell.
-        let found = if !counts && found == 0 && !c.equal() { 1 } else { found };
+        if !counts && found == 0 && !c.equal() {
+            return Err(Past::Light { found: c.psnr_linear });
+        }
         if found > most { Err(Past::Pixels { found, codes, most }) } else { Ok(()) }
     }
 }
@@ -227,8 +237,13 @@ mod tests {
         let (a, b) = (Image::filled(3, 3, [0.5; 4]), Image::filled(3, 3, [0.5000001; 4]));
         let c = Compared::of_light(&a, &b).unwrap();
         assert!(!c.equal() && c.difference.beyond(0) == 0);
-        assert!(Tolerance::default().check(&c).is_err());
         assert!(Tolerance { codes: Some(0), ..Tolerance::default() }.check(&c).is_ok());
+        let past = Tolerance::default().check(&c);
+        assert_eq!(
+            past,
+            Err(Past::Light { found: c.psnr_linear }),
+            "no pixel is counted that differs by no code"
+        );
         assert!(Compared::of_light(&a, &a).unwrap().equal());
     }
 
