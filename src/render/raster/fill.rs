@@ -439,7 +439,7 @@ fn is_inside<const N: usize>(e0: I<N>, e1: I<N>, e2: I<N>) -> I<N> {
 
 /// Unsigned `a < b`.
 #[inline(always)]
-fn before<const N: usize>(a: I<N>, b: I<N>) -> I<N> {
+pub(super) fn before<const N: usize>(a: I<N>, b: I<N>) -> I<N> {
     let flip = I::splat(i32::MIN);
     (b + flip).gt(a + flip)
 }

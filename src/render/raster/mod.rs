@@ -33,6 +33,7 @@ mod colors;
 mod encode;
 mod fill;
 mod frame;
+mod mend;
 mod merge;
 mod resolve;
 mod scan;

@@ -7,7 +7,7 @@
 use super::TILE;
 use super::fill::{NONE, Won};
 use super::frame::Frame;
-use super::merge;
+use super::mend;
 use super::resolve::Area;
 use super::setup::Bins;
 use super::tile::TileScratch;
@@ -80,6 +80,12 @@ impl Entries {
         self.parts.clear();
         self.loose.clear();
         self.loose_ids.clear();
+    }
+
+    /// A part of a pixel, that a triangle's chain takes in.
+    #[inline(always)]
+    pub fn push_part(&mut self, key: Key, id: u32) {
+        self.parts.push(Part { id, key, listed: false });
     }
 
     #[inline(always)]
@@ -180,7 +186,7 @@ pub(super) fn look(frame: &Frame, bins: &[Bins], tile: usize, area: Area, scratc
     match frame.samples {
         1 => list::<1>(bins, tile, area, scratch),
         _ => {
-            mend(frame, area, scratch);
+            mend::mend(frame, area, scratch);
             list::<4>(bins, tile, area, scratch);
         }
     }
@@ -216,39 +222,9 @@ fn list<const SAMPLES: usize>(bins: &[Bins], tile: usize, area: Area, scratch: &
     }
 }
 
-/// Let pixels of four samples that show several triangles show one, or nothing where their parts are listed.
-#[inline(always)]
-fn mend(frame: &Frame, area: Area, scratch: &mut TileScratch) {
-    let mut left = scratch.seen.touched;
-    while left != 0 {
-        let b = left.trailing_zeros() as usize;
-        left &= left - 1;
-        let [x, y] = [b % 8 * 8, b / 8 * 8];
-        if x >= area.w || y >= area.h {
-            continue;
-        }
-        let columns = (1u32 << (area.w - x).min(8)) - 1;
-        let first = y * TILE + x;
-        let ids: &[u32; 4 * TILE * TILE] = scratch.seen.id[..4 * TILE * TILE].try_into().expect("a tile");
-        let mut rows = [0; 8];
-        for r in 0..8 {
-            let at = (4 * (first + r * TILE)) & (4 * TILE * TILE - 32);
-            rows[r] = torn(ids[at..at + 32].try_into().expect("eight pixels")) & columns;
-        }
-        for (r, mut torn) in rows.into_iter().enumerate().take(area.h - y) {
-            while torn != 0 {
-                let place = first + r * TILE + torn.trailing_zeros() as usize;
-                torn &= torn - 1;
-                let id = pixel(frame, place, scratch);
-                scratch.seen.id[4 * place..][..4].fill(id);
-            }
-        }
-    }
-}
-
 /// The numbers of the bits that are set among the lowest eight, side by side.
 #[inline(always)]
-fn bits(mask: u32) -> I8 {
+pub(super) fn bits(mask: u32) -> I8 {
     static BITS: [[u8; 8]; 256] = {
         let (mut table, mut mask) = ([[0; 8]; 256], 0);
         while mask < 256 {
@@ -279,38 +255,4 @@ fn load(ids: &[u32]) -> I8 {
         row.0[k] = ids[k] as i32;
     }
     row
-}
-
-/// Which of eight pixels of four samples show more than one thing.
-#[inline(always)]
-fn torn(ids: &[u32; 32]) -> u32 {
-    let mut by_sample = [I8::ZERO; 4];
-    for s in 0..4 {
-        for k in 0..8 {
-            by_sample[s].0[k] = ids[4 * k + s] as i32;
-        }
-    }
-    let [a, b, c, d] = by_sample;
-    !(a.equal(b) & a.equal(c) & a.equal(d)).bitmask() & 0xff
-}
-
-/// A pixel with more than one triangle, or with an empty part: the triangle if one stands for all, else nothing, and what is to
-/// be shaded is in `parts`.
-#[inline(always)]
-fn pixel(frame: &Frame, place: usize, scratch: &mut TileScratch) -> u32 {
-    let ids: &[u32; 4] = scratch.seen.id[4 * place..][..4].try_into().expect("four");
-    let z: &[f32; 4] = scratch.seen.z[4 * place..][..4].try_into().expect("four");
-    let (groups, n) = merge::groups(frame, ids, z, &mut scratch.last_draw);
-    if groups[0].covers == WHOLE {
-        return groups[0].id;
-    }
-    let mut covered = 0;
-    for g in &groups[..n] {
-        covered |= g.covers;
-        scratch.entries.parts.push(Part { id: g.id, key: key(place, g.covers), listed: false });
-    }
-    let count = covered.count_ones();
-    scratch.stats.samples += count as u64;
-    scratch.colors.share(place, 4 - count, frame.scene.background);
-    NONE
 }

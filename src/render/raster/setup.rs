@@ -35,6 +35,15 @@ pub(super) struct Bins {
     corners: Vec<Corners>,
 }
 
+/// Pixels that a small triangle may have.
+const TESTS: usize = (SMALL * SMALL) as usize;
+
+/// Where eight triangles were tested: the pixel, counted from each one's first, and their second and third edge functions there.
+#[derive(Clone, Copy, Debug, Default)]
+struct Hit {
+    e: [I8; 2],
+}
+
 /// Coordinates of the three corners of eight triangles.
 #[derive(Clone, Copy, Debug)]
 struct Corners {
@@ -181,11 +190,11 @@ struct Depths {
 }
 
 impl Depths {
-    /// Where the second and third edge function have these values.
+    /// Of one triangle, where the second and third edge function have these values.
     #[inline(always)]
-    fn at(&self, e1: I8, e2: I8) -> F8 {
-        let (b1, b2) = (e1.to_f32() * self.scale, e2.to_f32() * self.scale);
-        self.first + self.along[0] * b1 + self.along[1] * b2
+    fn at(&self, [e1, e2]: [I8; 2], l: usize) -> f32 {
+        let (b1, b2) = (e1.0[l] as f32 * self.scale.0[l], e2.0[l] as f32 * self.scale.0[l]);
+        self.first.0[l] + self.along[0].0[l] * b1 + self.along[1].0[l] * b2
     }
 }
 
@@ -200,18 +209,19 @@ impl Kernel for Share<'_> {
         let xy = &self.vertices.xy[self.draw.first_vertex..][..n];
         let mut id = self.from;
         let mut corners = std::mem::take(&mut self.bins.corners);
+        let mut hits = [Hit::default(); TESTS];
         corners.resize(GROUPS, Corners { x: [I8::ZERO; 3], y: [I8::ZERO; 3] });
         for chunk in list.chunks(8 * GROUPS) {
             look_up(chunk, xy, &mut corners);
             let (groups, rest) = chunk.as_chunks::<8>();
             for (tris, corners) in groups.iter().zip(&corners) {
-                self.group(tris, 0xff, id, corners);
+                self.group(tris, 0xff, id, corners, &mut hits);
                 id += 8;
             }
             if let Some(&first) = rest.first() {
                 let mut tris = [first; 8];
                 tris[..rest.len()].copy_from_slice(rest);
-                self.group(&tris, (1 << rest.len()) - 1, id, &corners[groups.len()]);
+                self.group(&tris, (1 << rest.len()) - 1, id, &corners[groups.len()], &mut hits);
             }
         }
         self.bins.corners = corners;
@@ -220,7 +230,7 @@ impl Kernel for Share<'_> {
 
 impl Share<'_> {
     #[inline(always)]
-    fn group(&mut self, tris: &[[u32; 3]; 8], lanes: u32, first: u32, corners: &Corners) {
+    fn group(&mut self, tris: &[[u32; 3]; 8], lanes: u32, first: u32, corners: &Corners, hits: &mut [Hit; TESTS]) {
         let Corners { x, y } = corners;
 
         // Lanes with a corner outside, or too long for 32-bit products, go one by one.
@@ -262,7 +272,7 @@ impl Share<'_> {
         let large = if direct { wide.bitmask() & left } else { left };
         let g = Group { tris, first, corners, lo: [lo_x, lo_y], hi: [hi_x, hi_y] };
         if left & !large != 0 {
-            self.small(&g, area, left & !large);
+            self.small(&g, area, left & !large, hits);
         }
         // In the order in which they were submitted.
         for k in bits(large | slow) {
@@ -272,7 +282,7 @@ impl Share<'_> {
 
     /// Test every sample in the bounds of small triangles, a sample of all eight at a time.
     #[inline(always)]
-    fn small(&mut self, g: &Group, area: I8, active: u32) {
+    fn small(&mut self, g: &Group, area: I8, active: u32, hits: &mut [Hit; TESTS]) {
         // Turn all triangles the same way round.
         let turn = I8::ZERO.gt(area);
         let pick = |a: I8, b: I8| (turn.select_int(b, a), turn.select_int(a, b));
@@ -280,7 +290,7 @@ impl Share<'_> {
         let ((x1, x2), (y1, y2)) = (pick(x[1], x[2]), pick(y[1], y[2]));
         let (x, y) = ([x[0], x1, x2], [y[0], y1, y2]);
         // Most triangles that are this small hold no sample, so their depths wait for the first that does.
-        let mut plane: Option<Depths> = None;
+        let mut plane = None;
 
         // Edge functions at the first pixel's centre, with the fill rule as a bias; steps of one pixel.
         let px = g.lo[0].shift_left(8) + I8::splat(128);
@@ -307,6 +317,7 @@ impl Share<'_> {
             let [sx, sy] = if self.frame.samples == 1 { [0, 0] } else { ROTATED[s] };
             let start = |k: usize| e[k] + dx[k] * I8::splat(sy) - dy[k] * I8::splat(sx);
             let mut row = [start(0), start(1), start(2)];
+            let mut found = 0u128;
             for j in 0..SMALL {
                 let in_rows = rows[j as usize];
                 if in_rows == 0 {
@@ -319,15 +330,9 @@ impl Share<'_> {
                         break;
                     }
                     let hit = in_bounds & !(at[0] | at[1] | at[2]).bitmask();
-                    if hit != 0 {
-                        let now = match plane {
-                            Some(p) => p,
-                            None => self.depths(g, turn, turn.select_int(I8::ZERO - area, area)),
-                        };
-                        plane = Some(now);
-                        let z = now.at(at[1] - bias[1], at[2] - bias[2]);
-                        self.emit(g, hit, z, [i, j, s as i32]);
-                    }
+                    let test = SMALL * j + i;
+                    found |= u128::from(hit) << (8 * test);
+                    hits[test as usize] = Hit { e: [at[1] - bias[1], at[2] - bias[2]] };
                     for k in 0..3 {
                         at[k] = at[k] - across[k];
                     }
@@ -335,6 +340,10 @@ impl Share<'_> {
                 for k in 0..3 {
                     row[k] = row[k] + down[k];
                 }
+            }
+            if found != 0 {
+                let plane = plane.get_or_insert_with(|| self.depths(g, turn, turn.select_int(I8::ZERO - area, area)));
+                self.emit(g, found, hits, plane, s);
             }
         }
     }
@@ -355,15 +364,21 @@ impl Share<'_> {
         Depths { first: z[0], along: [z1 - z[0], z2 - z[0]], scale: F8::ONE / area.to_f32() }
     }
 
-    /// Hand the hit samples to their tiles.
+    /// Hand the hit samples to their tiles: eight bits a test, and where each was.
     #[inline(always)]
-    fn emit(&mut self, g: &Group, hit: u32, z: F8, [i, j, s]: [i32; 3]) {
-        for k in bits(hit) {
-            let l = k as usize & 7;
-            let (px, py) = ((g.lo[0].0[l] + i) as usize, (g.lo[1].0[l] + j) as usize);
-            let tile = &mut self.bins.tiles[py / TILE * self.frame.tiles_x + px / TILE];
-            let place = ((py % TILE * TILE + px % TILE) * self.frame.samples + s as usize) as u32;
-            tile.fragments.push(Fragment { place, z: z.0[l], id: g.first + k });
+    fn emit(&mut self, g: &Group, found: u128, hits: &[Hit; TESTS], plane: &Depths, s: usize) {
+        for (half, mut left) in [found as u64, (found >> 64) as u64].into_iter().enumerate() {
+            while left != 0 {
+                let bit = left.trailing_zeros() as usize;
+                left &= left - 1;
+                let (test, l) = (8 * half + bit / 8, bit % 8);
+                let x = g.lo[0].0[l] as usize + test % SMALL as usize;
+                let y = g.lo[1].0[l] as usize + test / SMALL as usize;
+                let tile = &mut self.bins.tiles[y / TILE * self.frame.tiles_x + x / TILE];
+                let place = ((y % TILE * TILE + x % TILE) * self.frame.samples + s) as u32;
+                let z = plane.at(hits[test].e, l);
+                tile.fragments.push(Fragment { place, z, id: g.first + l as u32 });
+            }
         }
     }
 

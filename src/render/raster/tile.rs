@@ -20,6 +20,8 @@ pub(super) struct TileScratch {
     pub stats: Stats,
     pub seen: Visibility,
     pub entries: Entries,
+    /// Pixels that show more than one triangle, and room for eight more.
+    pub torn: Vec<i32>,
     pub colors: Colors,
     pub blend: BlendScratch,
     pub last_draw: LastDraw,
