@@ -1,7 +1,8 @@
 //! Pixels of four samples that show more than one triangle: most come to show one, which stands for all.
 //!
-//! They are listed first. Most lie where two triangles of one mesh meet; these are told apart without a branch, as none of it could be
-//! foretold. Of the others, one by one, what [`merge`] makes of them.
+//! [`merge`] says which: one by one, by branches that nobody can foretell. So they are listed first, and those that are decided by vertices
+//! in common, which is most, are found without a branch: where two triangles meet eight at a time, where more do singly. Of what is left,
+//! [`merge`] tells. That takes 5 to 10 % off a picture.
 
 use super::TILE;
 use super::fill::{NONE, before};
@@ -86,7 +87,8 @@ fn join_pairs(frame: &Frame, n: usize, scratch: &mut TileScratch) -> usize {
     let ids: &mut [u32; 4 * TILE * TILE] = (&mut seen.id[..4 * TILE * TILE]).try_into().expect("a tile");
     let torn: &mut [i32; TILE * TILE + 8] = (&mut torn[..TILE * TILE + 8]).try_into().expect("of a tile");
     let none = [0; TOGETHER];
-    let mut pairs = Pairs { samples: [none; 4], lead: none, triangles: [none; 2], ours: none, corners: [[none; 3]; 2] };
+    let mut pairs =
+        Pairs { samples: [none; 4], lead: none, triangles: [none; 2], ours: none, corners: [[none; 3]; 2] };
     let (n, mut left) = (n.min(TILE * TILE), 0);
     for first in (0..n).step_by(TOGETHER) {
         let count = (n - first).min(TOGETHER);
@@ -192,7 +194,9 @@ fn of_all(draw: &Draw, ids: [u32; 4]) -> (u32, bool) {
     let triangles = &draw.object.mesh.triangles[..];
     let mut corners = [[0; 3]; 5];
     for (k, id) in ids.into_iter().chain([lead]).enumerate() {
-        let Some(of) = triangles.get(id.wrapping_sub(draw.first_triangle) as usize) else { return (lead, false) };
+        let Some(of) = triangles.get(id.wrapping_sub(draw.first_triangle) as usize) else {
+            return (lead, false);
+        };
         corners[k] = *of;
     }
     let mut all = true;
@@ -234,4 +238,104 @@ fn several(ids: &[u32; 32]) -> u32 {
     }
     let [a, b, c, d] = by_sample;
     !(a.equal(b) & a.equal(c) & a.equal(d)).bitmask() & 0xff
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::simd::Isa;
+    use crate::mesh::{Mesh, MeshData};
+    use crate::render::Settings;
+    use crate::scene::{Camera, Material, Object, Projection, Scene, Style};
+    use crate::test_rng::Rng;
+    use glam::Vec3;
+
+    /// A grid of so many vertices a side; alternate normals are turned away where it is `rough`.
+    fn grid(side: u32, rough: bool) -> Mesh {
+        let mut data = MeshData::default();
+        for k in 0..side * side {
+            data.positions.push(Vec3::new((k % side) as f32, (k / side) as f32, 0.0));
+            data.normals.push(if rough && k % 2 == 1 { Vec3::X } else { Vec3::Z });
+        }
+        for k in (0..(side - 1) * side).filter(|k| k % side + 1 < side) {
+            data.triangles.extend([[k, k + 1, k + side], [k + 1, k + side + 1, k + side]]);
+        }
+        Mesh::new(data).expect("a grid is a mesh")
+    }
+
+    /// Whatever four samples show, they come to show what [`merge`] says of the pixel by itself.
+    #[test]
+    fn many_at_once_become_what_each_does_by_itself() {
+        let meshes = [grid(6, false), grid(5, true), grid(4, false)];
+        let object = |k: usize, flat: bool| Object {
+            mesh: &meshes[k],
+            positions: &meshes[k].positions,
+            normals: if flat { &[] } else { &meshes[k].normals },
+            tangents: &[],
+            material: 0,
+            mirrored: false,
+            labels: &[],
+        };
+        let projection = Projection::Orthographic { height: 4.0 };
+        let scene = Scene {
+            camera: Camera::look_at(Vec3::Z, Vec3::ZERO, Vec3::Y, projection).expect("it looks ahead"),
+            ambient: Vec3::ONE,
+            lights: vec![],
+            style: Style::default(),
+            background: [0.0; 4],
+            objects: vec![object(0, false), object(1, false), object(2, true)],
+            shapes: &[],
+            materials: &[Material::default()],
+            textures: &[],
+        };
+        let settings = Settings { width: 61, height: 50, samples: 4, threads: 1 };
+        let frame = Frame::new(Isa::Portable, &scene, &settings);
+        let area = Area { origin: [0, 0], to: 0, w: 61, h: 50 };
+        let mut rng = Rng::new(3);
+        let (mut joined, mut apart) = (0, 0);
+        for kinds in [2, 3, 4, 4] {
+            let mut scratch = TileScratch::default();
+            scratch.seen.start(4);
+            scratch.colors.start(crate::render::raster::colors::Sink::Linear, 4, [0.0; 4]);
+            scratch.seen.touch([0, 60], [0, 49]);
+            for place in 0..TILE * TILE {
+                // Neighbours in the list of a mesh, of another, and nothing.
+                let first = rng.next() as u32 % frame.triangle_count;
+                let mut some = [0; 4].map(|_: u32| (first + rng.next() as u32 % 3) % frame.triangle_count);
+                match rng.next() % 8 {
+                    0 => some[1] = NONE,
+                    1 => some[1] = rng.next() as u32 % frame.triangle_count,
+                    _ => {}
+                }
+                for s in 0..4 {
+                    let at = 4 * place + s;
+                    scratch.seen.id[at] = some[(rng.next() % kinds) as usize];
+                    scratch.seen.z[at] = 0.5 + 0.2 * rng.unit();
+                }
+            }
+            let before = scratch.seen.id.clone();
+            mend(&frame, area, &mut scratch);
+            for place in (0..TILE * 50).filter(|p| p % TILE < 61) {
+                let [ids, now]: [[u32; 4]; 2] =
+                    [&before, &scratch.seen.id].map(|all| all[4 * place..][..4].try_into().expect("four"));
+                let z = scratch.seen.z[4 * place..][..4].try_into().expect("four");
+                let (groups, _) = merge::groups(&frame, &ids, z, &mut Default::default());
+                let same = ids == [ids[0]; 4];
+                let whole = same || groups[0].covers == WHOLE;
+                assert_eq!(
+                    now,
+                    [if same {
+                        ids[0]
+                    } else if whole {
+                        groups[0].id
+                    } else {
+                        NONE
+                    }; 4],
+                    "{ids:?}"
+                );
+                (joined, apart) = (joined + usize::from(whole && !same), apart + usize::from(!whole));
+            }
+        }
+        assert!(joined > 3000 && apart > 1000, "{joined} {apart}");
+    }
 }

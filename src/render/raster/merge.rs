@@ -50,22 +50,14 @@ pub(super) fn groups(
         let bit = |s: usize| ((ids[s] == id) as u32) << s;
         bit(0) | bit(1) | bit(2) | bit(3)
     };
-    // Two of one surface, or one before nothing: that is most of them.
+    // One before nothing: that is most of them.
     let first = same(ids[0]);
     let other = ids[(!first & 0xf).trailing_zeros() as usize & 3];
     let (second, mut out) = (same(other), [Group::default(); 4]);
-    if first | second == 0xf {
-        if ids[0] == NONE || other == NONE {
-            let (id, covers) = if other == NONE { (ids[0], first) } else { (other, second) };
-            out[0] = Group { id, covers };
-            return (out, 1);
-        }
-        let id = if first.count_ones() >= 2 { ids[0] } else { other };
-        let draw = last.find(frame, ids[0]);
-        if draw.continuous && draw.ids().contains(&other) && last.share(draw, ids[0], other) {
-            out[0] = Group { id, covers: 0xf };
-            return (out, 1);
-        }
+    if first | second == 0xf && (ids[0] == NONE || other == NONE) {
+        let (id, covers) = if other == NONE { (ids[0], first) } else { (other, second) };
+        out[0] = Group { id, covers };
+        return (out, 1);
     }
     let mut left = 0xf & !same(NONE);
 

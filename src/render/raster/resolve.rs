@@ -6,7 +6,6 @@
 use super::clay::Clay;
 use super::colors::{Colors, Sink};
 use super::frame::{Draw, Frame, ROTATED};
-use super::merge::share_a_vertex;
 use super::scan::{self, Chain, Key, WHOLE, covers, key};
 use super::setup::Bins;
 use super::surface::{self, Corners, Shade};
@@ -290,14 +289,11 @@ fn find_runs(frame: &Frame, ids: &[u32], runs: &mut Vec<(u32, u32, u32)>) {
     runs.sort_by_key(|r| r.0);
 }
 
-/// Remembers which draw the last triangle belonged to, and whether the last two share a vertex: along an edge it is asked for
-/// every pixel.
+/// Remembers which draw the last triangle belonged to: along an edge it is asked for every pixel.
 #[derive(Debug, Default)]
 pub(super) struct LastDraw {
     range: std::ops::Range<u32>,
     d: usize,
-    pair: [u32; 2],
-    shared: bool,
 }
 
 impl LastDraw {
@@ -308,18 +304,6 @@ impl LastDraw {
             self.range = frame.draws[self.d].ids();
         }
         &frame.draws[self.d]
-    }
-
-    /// Whether two triangles of a draw share a vertex.
-    #[inline(always)]
-    pub fn share(&mut self, draw: &Draw, a: u32, b: u32) -> bool {
-        let pair = [a.min(b), a.max(b)];
-        if pair != self.pair {
-            let corners = |id: u32| draw.object.mesh.triangles[(id - draw.first_triangle) as usize];
-            self.shared = share_a_vertex(corners(a), corners(b));
-            self.pair = pair;
-        }
-        self.shared
     }
 }
 

@@ -230,7 +230,14 @@ impl Kernel for Share<'_> {
 
 impl Share<'_> {
     #[inline(always)]
-    fn group(&mut self, tris: &[[u32; 3]; 8], lanes: u32, first: u32, corners: &Corners, hits: &mut [Hit; TESTS]) {
+    fn group(
+        &mut self,
+        tris: &[[u32; 3]; 8],
+        lanes: u32,
+        first: u32,
+        corners: &Corners,
+        hits: &mut [Hit; TESTS],
+    ) {
         let Corners { x, y } = corners;
 
         // Lanes with a corner outside, or too long for 32-bit products, go one by one.
@@ -289,7 +296,6 @@ impl Share<'_> {
         let Corners { x, y } = g.corners;
         let ((x1, x2), (y1, y2)) = (pick(x[1], x[2]), pick(y[1], y[2]));
         let (x, y) = ([x[0], x1, x2], [y[0], y1, y2]);
-        // Most triangles that are this small hold no sample, so their depths wait for the first that does.
         let mut plane = None;
 
         // Edge functions at the first pixel's centre, with the fill rule as a bias; steps of one pixel.
@@ -342,8 +348,13 @@ impl Share<'_> {
                 }
             }
             if found != 0 {
-                let plane = plane.get_or_insert_with(|| self.depths(g, turn, turn.select_int(I8::ZERO - area, area)));
-                self.emit(g, found, hits, plane, s);
+                // Most triangles that are this small hold no sample, so their depths wait for the first that does.
+                let now = match plane {
+                    Some(plane) => plane,
+                    None => self.depths(g, turn, turn.select_int(I8::ZERO - area, area)),
+                };
+                plane = Some(now);
+                self.emit(g, found, hits, &now, s);
             }
         }
     }
