@@ -299,7 +299,7 @@ impl<const N: usize> Walk<N> {
         }
     }
 
-    /// Visit all samples side by side, as many as lanes, of which one is covered.
+    /// Visit all samples side by side, as many as lanes, of which one is covered, and some of which none is.
     #[inline(always)]
     pub fn visit(&self, samples: usize, visitor: &mut impl Visitor<N>) {
         let (lo, hi) = (F::splat(self.z_lo), F::splat(self.z_hi));
@@ -312,13 +312,15 @@ impl<const N: usize> Walk<N> {
         let (across0, across1, across2) = (across(0), across(1), across(2));
         let down = |k: usize| I::splat(self.step_y[k]);
         let (down0, down1, down2) = (down(0), down(1), down(2));
+        // Of four samples most steps hold one; whether one wins is asked anyway.
+        let always = samples == 4;
         let x0 = (lane_pixels::<N>(samples) + I::splat(first)).to_f32();
         let (z_x, wide_x) = (F::splat(self.z_x), F::splat(wide as f32));
         if steps == 1 {
             let (z_x0, mut at) = (z_x * x0, (self.y[0] * TILE as i32 + first) as usize * samples);
             for y in self.y[0]..=self.y[1] {
                 let inside = is_inside(e0, e1, e2);
-                if inside.any() {
+                if always || inside.any() {
                     let z = self.z + (z_x0 + F::splat(self.z_y * y as f32));
                     visitor.see(at, inside, z.max(lo).min(hi));
                 }
@@ -334,7 +336,7 @@ impl<const N: usize> Walk<N> {
             let mut met = false;
             for _ in 0..steps {
                 let inside = is_inside(f0, f1, f2);
-                if inside.any() {
+                if always || inside.any() {
                     let z = self.z + (z_x * x + z_y);
                     visitor.see(at, inside, z.max(lo).min(hi));
                     met = true;
@@ -372,7 +374,7 @@ impl<const N: usize> Walk<N> {
 /// What is done where a triangle is. A trait and no closure: what is not inlined loses its vector instructions, and only of
 /// functions can it be demanded.
 pub(super) trait Visitor<const N: usize> {
-    /// Samples side by side: place of the first, mask of those that are covered, depths.
+    /// Samples side by side: place of the first, mask of those that are covered, if any is, depths.
     fn see(&mut self, at: usize, inside: I<N>, z: F<N>);
 }
 
