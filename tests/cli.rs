@@ -141,6 +141,37 @@ fn stills_sequences_and_films_are_written_whole_and_never_over_what_exists() {
 }
 
 #[test]
+fn what_a_rig_lacks_or_loses_is_said() {
+    let (dir, input) = folder();
+    let said = |args: &[&str]| {
+        let out = sinew(args);
+        assert!(out.status.success(), "{}", text(&out.stderr));
+        text(&out.stderr)
+    };
+    // Its poses have times of their own beside the keys.
+    let poses = r##"{"sinew_poses": 1, "rate": [30, 1], "clips": [{"name": "wave", "range": [0, 1], "tracks": [
+  {"bone": "flag", "xzx_deg": [[0, 0,0,0], [1, 0,40,0]]}]}]}"##;
+    std::fs::write(path(&dir, "flag.poses.json"), poses).unwrap();
+    let warned = said(&["bake", &input, "-o", &path(&dir, "baked.json")]);
+    assert!(warned.contains("left out, since bakes may change times: frame rate, ranges\n"), "{warned}");
+    assert!(said(&["render", &input, "-o", &path(&dir, "moves.webp"), "--size", "16"]).contains("wrote"));
+
+    // What is wrong with either is said by its name, once.
+    let broken = path(&dir, "broken.json");
+    std::fs::write(&broken, r#"{"sinew_rig": 1, "bones": 3}"#).unwrap();
+    let (code, wrong) = fails(&["info", &broken]);
+    assert!(code == 3 && wrong.matches("broken.json").count() == 1 && wrong.contains("column 27"), "{wrong}");
+
+    // A rig that was copied without its poses.
+    let rig = std::fs::read_to_string(&input).unwrap().replace(",\n  \"poses\": [\"flag.poses.json\"]", "");
+    std::fs::write(&input, rig).unwrap();
+    let film = said(&["render", &input, "-o", &path(&dir, "rests.webp"), "--size", "16"]);
+    assert!(film.contains("there is no clip") && film.contains("../poses/"), "{film}");
+    let still = said(&["render", &input, "-o", &path(&dir, "rests.png"), "--size", "16"]);
+    assert!(!still.contains("no clip"), "{still}");
+}
+
+#[test]
 fn a_turntable_is_one_turn_long_and_says_where_the_clip_is_cut() {
     let (dir, input) = folder();
     let run = |folder: &str, more: &[&str]| {

@@ -341,6 +341,9 @@ fn one_file_that_fails_does_not_stop_the_others() {
         let run = sinew(&args);
         assert!(text(&run.stderr).contains(says), "{args:?}: {}", text(&run.stderr));
     }
+    // A seam that is longer than the clip.
+    let run = sinew(&["bake", &a, "-o", &path(&dir, "bent.glb"), "--loop-blend", "99s"]);
+    assert!(run.status.success() && text(&run.stderr).contains("all of it is bent"), "{}", text(&run.stderr));
     // A file a clip.
     let each = path(&dir, "clips/{name}-{clip}.gltf");
     assert!(sinew(&["bake", &a, "-o", &each, "-q"]).status.success());

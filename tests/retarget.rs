@@ -204,6 +204,9 @@ fn the_program_carries_a_capture_onto_a_rig_and_says_what_nothing_follows() {
     let with_map = ["bake", &rig, "--motion", &bvh, "--retarget", &map, "-o", &glb, "--json"];
     let (code, said) = fails(&with_map);
     assert!(code == 2 && said.contains("`mast` is no bone of the input"), "{said}");
+    std::fs::write(&map, r#"{"bones": {"Pole": "flag", "Pole": null}}"#).unwrap();
+    let (code, said) = fails(&with_map);
+    assert!(code == 3 && said.contains("map.json") && said.contains("`Pole` is there twice"), "{said}");
     std::fs::write(&map, r#"{"bones": {"Pole": "flag"}, "scale": 1}"#).unwrap();
     let out = sinew(&with_map);
     assert!(out.status.success(), "{}", text(&out.stderr));
@@ -225,5 +228,7 @@ fn the_program_carries_a_capture_onto_a_rig_and_says_what_nothing_follows() {
     let poses = std::fs::read_to_string(path(&dir, "again.poses.json")).unwrap();
     assert!(poses.contains("xzx_deg") && !poses.contains("rotation"), "{poses}");
     let (code, said) = fails(&["bake", &glb, "--to", "xzx", "-o", &path(&dir, "b.glb")]);
-    assert!(code == 2 && said.contains("no place for angles"), "{said}");
+    assert!(code == 2 && said.contains("glTF has no place for angles"), "{said}");
+    let (code, said) = fails(&["bake", &glb, "--to", "xzx", "-o", &path(&dir, "b.sinew")]);
+    assert!(code == 2 && said.contains("packed clips has no place for angles"), "{said}");
 }

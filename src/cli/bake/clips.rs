@@ -171,6 +171,13 @@ fn placed(
         }
     }
     if let Some(seconds) = args.loop_blend {
+        let all = clip.range().duration();
+        if seconds > all {
+            say.note(&format!(
+                "--loop-blend {seconds}s: clip {} lasts {all:.3} s; all of it is bent",
+                say::name(&clip.name)
+            ));
+        }
         clip = edit::blend(&clip, seconds);
     }
     let apart = Gauge::of(character, desc).seam(&clip);

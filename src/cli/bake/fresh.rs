@@ -50,8 +50,16 @@ pub(super) fn rig(
     let poses = rig_json::export_poses(&import.asset.character, &clips);
     say.warnings(input, &rig.warnings);
     say.warnings(input, &poses.warnings);
-    if import.timeline.clips.iter().any(|c| !c.markers.is_empty()) {
-        say.warn(&format!("{}: markers are left out, since bakes may change times", input.display()));
+    let of = &import.timeline;
+    let kept = [
+        ("frame rate", of.rate.is_some()),
+        ("ranges", of.clips.iter().any(|c| c.range.is_some() || c.preview.is_some())),
+        ("markers", of.clips.iter().any(|c| !c.markers.is_empty())),
+    ];
+    let lost: Vec<&str> = kept.iter().filter(|k| k.1).map(|k| k.0).collect();
+    if !lost.is_empty() {
+        let lost = lost.join(", ");
+        say.warn(&format!("{}: left out, since bakes may change times: {lost}", input.display()));
     }
     let mut files = vec![];
     for (name, texture) in names.iter().zip(&import.asset.textures) {

@@ -1,7 +1,8 @@
 //! Clips of other files: captures, and animations for another skeleton.
 
 use crate::cli::{Failure, load, packed_clips, say::Say};
-use serde::Deserialize;
+use serde::de::{self, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer};
 use serde_json::{Value, json};
 use sinew::bake::retarget::{self, Map};
 use sinew::io::{self, Import, Options};
@@ -25,11 +26,34 @@ pub(super) struct Motion {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
-    #[serde(default)]
+    #[serde(default, deserialize_with = "once")]
     bones: BTreeMap<String, Option<String>>,
     #[serde(default)]
     scale: Scale,
     directions: Option<bool>,
+}
+
+/// A map of which no name is there twice: one of its two would be lost.
+fn once<'de, D: Deserializer<'de>>(from: D) -> Result<BTreeMap<String, Option<String>>, D::Error> {
+    struct Once;
+    impl<'de> Visitor<'de> for Once {
+        type Value = BTreeMap<String, Option<String>>;
+
+        fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+            f.write_str("names of bones, or null, by names of bones")
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Self::Value, A::Error> {
+            let mut bones = BTreeMap::new();
+            while let Some((from, to)) = entries.next_entry::<String, _>()? {
+                if bones.insert(from.clone(), to).is_some() {
+                    return Err(de::Error::custom(format!("bones: `{from}` is there twice")));
+                }
+            }
+            Ok(bones)
+        }
+    }
+    from.deserialize_map(Once)
 }
 
 #[derive(Deserialize)]

@@ -38,7 +38,11 @@ impl To {
         match (self.to, is_rig(output)) {
             (Some(Form::Xzx), false) => {
                 let name = output.display();
-                Err(Failure::Usage(format!("--to xzx -o {name}: glTF has no place for angles; name a .json")))
+                let packed = output.extension().is_some_and(|e| e.eq_ignore_ascii_case("sinew"));
+                let what = if packed { "a file of packed clips" } else { "glTF" };
+                Err(Failure::Usage(format!(
+                    "--to xzx -o {name}: {what} has no place for angles; name a .json"
+                )))
             }
             (Some(form), _) => Ok(form),
             (None, rig) => Ok(if rig { Form::Xzx } else { Form::Quat }),

@@ -160,6 +160,10 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         ));
     }
 
+    if character.clips().is_empty() && task.target.takes_a_clip() && plan.frames.len() == 1 {
+        say.note(&no_clip(task));
+    }
+
     let range = task.clip.map_or(Range::default(), |c| character.clips()[c].playback());
     let seam = args.camera.turntable.and_then(|lap| args.time.seam(range, lap));
     if let Some(note) = seam.filter(|_| plan.frames.len() > 1) {
@@ -250,6 +254,17 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
     say_samples(args, &written, frames * shot.size()[0] * shot.size()[1], say);
     totals.add(&written, frames);
     Ok(written)
+}
+
+/// Why a film has one picture.
+fn no_clip(task: &Task) -> String {
+    let input = task.input.display();
+    let mut text = format!("{input}: there is no clip, so there is one picture, of its rest pose");
+    if task.import.setting.is_none() && task.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"))
+    {
+        text += "; a rig's clips come from the files of its `poses`, or from ../poses/ and its own name";
+    }
+    text
 }
 
 /// Say how many samples pictures got that time ended.

@@ -38,23 +38,22 @@ pub type Fetch<'a> = &'a dyn Fn(&str) -> std::io::Result<Vec<u8>>;
 /// [`MAX_TEXTURE_BYTES`] together.
 ///
 /// # Errors
-/// [`RigError::In`] names the file that is at fault.
+/// [`RigError`]; the caller knows which file it named, [`RigError::In`] names another that the rig names.
 pub fn import(path: &Path, options: &Options) -> Result<Import, RigError> {
-    let inside = |error: RigError| RigError::In { file: path.into(), error: Box::new(error) };
     let read = |source| RigError::Read { file: path.display().to_string(), source };
     let bytes = read_file(path).map_err(read)?;
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let home = folder.canonicalize().map_err(read)?;
     let above = home.parent().unwrap_or(&home);
     let fetch = |relative: &str| read_below(above, &home.join(relative));
-    let mut rig = Rig::from_bytes(&bytes).map_err(inside)?;
+    let mut rig = Rig::from_bytes(&bytes)?;
     if rig.poses.is_none()
         && let Some(name) = path.file_name().and_then(|n| n.to_str())
     {
         let beside = format!("../poses/{name}");
         rig.poses = folder.join(&beside).is_file().then(|| vec![beside]);
     }
-    rig.to_import(options, &fetch).map_err(inside)
+    rig.to_import(options, &fetch)
 }
 
 /// Read a rig from memory; `fetch` supplies the textures and poses that it lists.
