@@ -261,6 +261,26 @@ fn keys_are_sorted_and_bad_ones_named() {
 }
 
 #[test]
+fn rotations_that_are_none_are_said_and_do_no_harm() {
+    let mut file = File::new();
+    let times = file.floats("SCALAR", &[0.0, 1.0, 2.0]);
+    // None at all, one of twice the length, and one as far off as bytes make it.
+    let values = file.floats("VEC4", &[0., 0., 0., 0., 0., 0., 2., 0., 0., 0., 0., 1.005]);
+    file.json["animations"] = json!([{
+        "samplers": [{ "input": times, "output": values }],
+        "channels": [{ "sampler": 0, "target": { "node": 0, "path": "rotation" } }]
+    }]);
+    let import = file.import();
+    let said = &import.warnings[0];
+    assert_eq!((import.warnings.len(), &*said.place), (1, "animations[0].channels[0]"));
+    let says = "its key at 0 s is a quaternion of length 0; no rotation is taken (1 more like it)";
+    assert_eq!(said.message, says);
+    assert_eq!(positions(&import, Some(0), 0.0, 0), positions(&import, None, 0.0, 0));
+    let half_turned = positions(&import, Some(0), 1.0, 0);
+    assert!(half_turned[1].distance(Vec3::new(-1.0, 0.0, 0.0)) < 1e-6, "{half_turned:?}");
+}
+
+#[test]
 fn morph_weights_rest_and_move() {
     let mut file = File::new();
     let delta = file.floats("VEC3", &[0., 0., 1.].repeat(5));

@@ -70,7 +70,26 @@ fn track(
     };
     let index = channel.sampler.value();
     let sampler = entry(&animation.samplers, index, "sampler", || format!("{place}.sampler"))?;
-    Ok(Some(Track { target, curve: curve(doc, sampler, width, shape, place, w)? }))
+    let curve = curve(doc, sampler, width, shape, place, w)?;
+    if matches!(target, Target::Rotation(_)) {
+        check_rotations(&curve, place, w);
+    }
+    Ok(Some(Track { target, curve }))
+}
+
+/// How far from 1 the length of a rotation may be: quaternions of bytes are off by almost as much.
+const UNIT: f32 = 0.01;
+
+/// Say which rotations are none as they stand.
+fn check_rotations(curve: &Curve, place: &str, w: &mut Warnings) {
+    let length = |k: usize| curve.value(k).iter().map(|v| v * v).sum::<f32>().sqrt();
+    let mut off = (0..curve.times().len()).filter(|&k| (length(k) - 1.0).abs() > UNIT);
+    if let Some(first) = off.next() {
+        let (time, length, more) = (curve.times()[first], length(first), off.count());
+        let what = if length > 0.0 { "normalised" } else { "no rotation is taken" };
+        let others = if more > 0 { format!(" ({more} more like it)") } else { String::new() };
+        w.push(place, format!("its key at {time} s is a quaternion of length {length}; {what}{others}"));
+    }
 }
 
 /// The keys of a sampler, of whatever width.
