@@ -1,12 +1,12 @@
 //! Many frames in one picture: sprite sheets and contact sheets. Geometry and copying; no files and no drawing here.
 //!
-//! 1. Each frame is cut to what is visible of it ([`visible`]), and equal cuts are kept once ([`Distinct`]).
-//! 2. A [`Layout`] says where each cut goes: in a [`grid`], or [`pack`]ed.
+//! 1. Each frame is cut to what is visible of it ([`visible()`]), and equal cuts are kept once ([`Distinct`]).
+//! 2. A [`Layout`] says where each cut goes: in a [`grid()`], or [`pack()`]ed.
 //! 3. A [`Canvas`] takes the pixels, of whatever kind they are: colour, palette indices, normals, depth.
 //! 4. An [`Assembler`] does all that with frames as they come.
 //! 5. A [`Sheet`] says what was put where; `io::sheet_json` writes that down for game engines.
 //!
-//! Frames are seen from several directions as [`directions`] names them.
+//! Frames are seen from several directions as [`directions()`] names them.
 
 mod assemble;
 mod canvas;
