@@ -206,12 +206,6 @@ impl<const N: usize> F<N> {
     }
 }
 
-impl<const N: usize> Default for I<N> {
-    fn default() -> Self {
-        Self::ZERO
-    }
-}
-
 impl<const N: usize> I<N> {
     /// Zero in every lane.
     pub const ZERO: Self = Self([0; N]);

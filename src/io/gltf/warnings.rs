@@ -20,10 +20,12 @@ struct Repeated {
     message: String,
     places: Vec<String>,
     count: usize,
+    /// Where it was found last.
+    last: String,
 }
 
 impl Warnings {
-    /// Note that `message` holds at `place`.
+    /// Note that `message` holds at `place`; said twice of one place, it counts once.
     pub fn push(&mut self, place: impl Into<String>, message: impl Into<String>) {
         let message = message.into();
         if self.list.len() == KEPT && !self.of.contains_key(&message) {
@@ -31,14 +33,18 @@ impl Warnings {
             return;
         }
         let at = *self.of.entry(message.clone()).or_insert_with(|| {
-            self.list.push(Repeated { message, places: Vec::new(), count: 0 });
+            self.list.push(Repeated { message, places: Vec::new(), count: 0, last: String::new() });
             self.list.len() - 1
         });
-        let entry = &mut self.list[at];
+        let (entry, place) = (&mut self.list[at], place.into());
+        if entry.count > 0 && entry.last == place {
+            return;
+        }
         entry.count += 1;
         if entry.places.len() < NAMED {
-            entry.places.push(place.into());
+            entry.places.push(place.clone());
         }
+        entry.last = place;
     }
 
     /// One warning a message: its first places, and how many more there are.
@@ -64,7 +70,7 @@ mod tests {
     #[test]
     fn what_repeats_is_counted() {
         let mut w = Warnings::default();
-        (0..10_000).for_each(|i| w.push(format!("nodes[{i}]"), "odd"));
+        (0..20_000).for_each(|i| w.push(format!("nodes[{}]", i / 2), "odd"));
         (0..500).for_each(|i| w.push("meshes[0]", format!("{i} odd")));
         let list = w.finish();
         assert_eq!(list[0].to_string(), "nodes[0], nodes[1], nodes[2] and 9997 more: odd");

@@ -45,7 +45,7 @@ fn list(area: Area, scratch: &mut TileScratch) -> usize {
         }
         let columns = (1u32 << (area.w - x).min(8)) - 1;
         for row in y..(y + 8).min(area.h) {
-            let place = row * TILE + x & (TILE * TILE - 8);
+            let place = (row * TILE + x) & (TILE * TILE - 8);
             let several = several(ids[4 * place..4 * place + 32].try_into().expect("eight pixels")) & columns;
             // What is written beyond those that are there is overwritten by the next.
             torn[n..n + 8].copy_from_slice(&(I8::splat(place as i32) + bits(several)).0);

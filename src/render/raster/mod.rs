@@ -10,7 +10,8 @@
 //! threads, on the vector instructions that the machine has, or on the order in which tiles are drawn.
 //!
 //! At four samples a pixel is shaded once for each surface in it and not for each triangle (`merge`); what is covered stays
-//! exact. A walking figure of 2,100 visible triangles in 30,000 pixels takes 30,000 evaluations then instead of 41,800.
+//! exact. A walking figure of 2,100 visible triangles in 30,000 pixels takes 30,000 evaluations then instead of 41,800. Most of the pixels
+//! that several triangles share are found out about without a branch (`mend`).
 //!
 //! What else makes it fast, measured on that figure: samples of a pixel side by side, only touched 8×8 blocks cleared and read,
 //! pixels listed by triangle through the whole tile, and colours encoded as they are shaded took 26 % off; texels decoded once,

@@ -38,11 +38,8 @@ pub(super) struct Bins {
 /// Pixels that a small triangle may have.
 const TESTS: usize = (SMALL * SMALL) as usize;
 
-/// Where eight triangles were tested: the pixel, counted from each one's first, and their second and third edge functions there.
-#[derive(Clone, Copy, Debug, Default)]
-struct Hit {
-    e: [I8; 2],
-}
+/// Second and third edge functions of eight triangles at one of those pixels each.
+type Edges = [I8; 2];
 
 /// Coordinates of the three corners of eight triangles.
 #[derive(Clone, Copy, Debug)]
@@ -209,19 +206,19 @@ impl Kernel for Share<'_> {
         let xy = &self.vertices.xy[self.draw.first_vertex..][..n];
         let mut id = self.from;
         let mut corners = std::mem::take(&mut self.bins.corners);
-        let mut hits = [Hit::default(); TESTS];
+        let mut tested = [[I8::ZERO; 2]; TESTS];
         corners.resize(GROUPS, Corners { x: [I8::ZERO; 3], y: [I8::ZERO; 3] });
         for chunk in list.chunks(8 * GROUPS) {
             look_up(chunk, xy, &mut corners);
             let (groups, rest) = chunk.as_chunks::<8>();
             for (tris, corners) in groups.iter().zip(&corners) {
-                self.group(tris, 0xff, id, corners, &mut hits);
+                self.group(tris, 0xff, id, corners, &mut tested);
                 id += 8;
             }
             if let Some(&first) = rest.first() {
                 let mut tris = [first; 8];
                 tris[..rest.len()].copy_from_slice(rest);
-                self.group(&tris, (1 << rest.len()) - 1, id, &corners[groups.len()], &mut hits);
+                self.group(&tris, (1 << rest.len()) - 1, id, &corners[groups.len()], &mut tested);
             }
         }
         self.bins.corners = corners;
@@ -236,7 +233,7 @@ impl Share<'_> {
         lanes: u32,
         first: u32,
         corners: &Corners,
-        hits: &mut [Hit; TESTS],
+        tested: &mut [Edges; TESTS],
     ) {
         let Corners { x, y } = corners;
 
@@ -279,7 +276,7 @@ impl Share<'_> {
         let large = if direct { wide.bitmask() & left } else { left };
         let g = Group { tris, first, corners, lo: [lo_x, lo_y], hi: [hi_x, hi_y] };
         if left & !large != 0 {
-            self.small(&g, area, left & !large, hits);
+            self.small(&g, area, left & !large, tested);
         }
         // In the order in which they were submitted.
         for k in bits(large | slow) {
@@ -289,7 +286,7 @@ impl Share<'_> {
 
     /// Test every sample in the bounds of small triangles, a sample of all eight at a time.
     #[inline(always)]
-    fn small(&mut self, g: &Group, area: I8, active: u32, hits: &mut [Hit; TESTS]) {
+    fn small(&mut self, g: &Group, area: I8, active: u32, tested: &mut [Edges; TESTS]) {
         // Turn all triangles the same way round.
         let turn = I8::ZERO.gt(area);
         let pick = |a: I8, b: I8| (turn.select_int(b, a), turn.select_int(a, b));
@@ -323,6 +320,7 @@ impl Share<'_> {
             let [sx, sy] = if self.frame.samples == 1 { [0, 0] } else { ROTATED[s] };
             let start = |k: usize| e[k] + dx[k] * I8::splat(sy) - dy[k] * I8::splat(sx);
             let mut row = [start(0), start(1), start(2)];
+            // Eight bits a test. None is handed out before all are known: whether a test finds any nobody can foretell.
             let mut found = 0u128;
             for j in 0..SMALL {
                 let in_rows = rows[j as usize];
@@ -338,7 +336,7 @@ impl Share<'_> {
                     let hit = in_bounds & !(at[0] | at[1] | at[2]).bitmask();
                     let test = SMALL * j + i;
                     found |= u128::from(hit) << (8 * test);
-                    hits[test as usize] = Hit { e: [at[1] - bias[1], at[2] - bias[2]] };
+                    tested[test as usize] = [at[1] - bias[1], at[2] - bias[2]];
                     for k in 0..3 {
                         at[k] = at[k] - across[k];
                     }
@@ -354,7 +352,7 @@ impl Share<'_> {
                     None => self.depths(g, turn, turn.select_int(I8::ZERO - area, area)),
                 };
                 plane = Some(now);
-                self.emit(g, found, hits, &now, s);
+                self.emit(g, found, tested, &now, s);
             }
         }
     }
@@ -375,9 +373,9 @@ impl Share<'_> {
         Depths { first: z[0], along: [z1 - z[0], z2 - z[0]], scale: F8::ONE / area.to_f32() }
     }
 
-    /// Hand the hit samples to their tiles: eight bits a test, and where each was.
+    /// Hand the samples that were found to their tiles.
     #[inline(always)]
-    fn emit(&mut self, g: &Group, found: u128, hits: &[Hit; TESTS], plane: &Depths, s: usize) {
+    fn emit(&mut self, g: &Group, found: u128, tested: &[Edges; TESTS], plane: &Depths, s: usize) {
         for (half, mut left) in [found as u64, (found >> 64) as u64].into_iter().enumerate() {
             while left != 0 {
                 let bit = left.trailing_zeros() as usize;
@@ -387,7 +385,7 @@ impl Share<'_> {
                 let y = g.lo[1].0[l] as usize + test / SMALL as usize;
                 let tile = &mut self.bins.tiles[y / TILE * self.frame.tiles_x + x / TILE];
                 let place = ((y % TILE * TILE + x % TILE) * self.frame.samples + s) as u32;
-                let z = plane.at(hits[test].e, l);
+                let z = plane.at(tested[test], l);
                 tile.fragments.push(Fragment { place, z, id: g.first + l as u32 });
             }
         }
