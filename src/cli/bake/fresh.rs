@@ -51,12 +51,12 @@ pub(super) fn rig(
     say.warnings(input, &rig.warnings);
     say.warnings(input, &poses.warnings);
     let of = &import.timeline;
-    let kept = [
+    let held = [
         ("frame rate", of.rate.is_some()),
         ("ranges", of.clips.iter().any(|c| c.range.is_some() || c.preview.is_some())),
         ("markers", of.clips.iter().any(|c| !c.markers.is_empty())),
     ];
-    let lost: Vec<&str> = kept.iter().filter(|k| k.1).map(|k| k.0).collect();
+    let lost: Vec<&str> = held.iter().filter(|k| k.1).map(|k| k.0).collect();
     if !lost.is_empty() {
         let lost = lost.join(", ");
         say.warn(&format!("{}: left out, since bakes may change times: {lost}", input.display()));

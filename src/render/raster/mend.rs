@@ -322,17 +322,9 @@ mod tests {
                 let (groups, _) = merge::groups(&frame, &ids, z, &mut Default::default());
                 let same = ids == [ids[0]; 4];
                 let whole = same || groups[0].covers == WHOLE;
-                assert_eq!(
-                    now,
-                    [if same {
-                        ids[0]
-                    } else if whole {
-                        groups[0].id
-                    } else {
-                        NONE
-                    }; 4],
-                    "{ids:?}"
-                );
+                let apart_or_one = if whole { groups[0].id } else { NONE };
+                let want = if same { ids[0] } else { apart_or_one };
+                assert_eq!(now, [want; 4], "{ids:?}");
                 (joined, apart) = (joined + usize::from(whole && !same), apart + usize::from(!whole));
             }
         }
