@@ -1,8 +1,8 @@
 //! Where the program's memory comes from: large blocks of zeros are there when they are handed out.
 //!
 //! A page of 4 KiB costs the kernel a microsecond when it is first touched, ten times what filling it takes, and a program that draws one
-//! picture touches thousands. Asked for together they cost a quarter. (Pages of 2 MiB cost less still where the machine has them at hand, and
-//! ten times as much where a virtual one must get them from its host first.)
+//! picture touches thousands. Asked for together they cost a quarter on some machines, and nowhere more. (Pages of 2 MiB cost less still
+//! where the machine has them at hand, and ten times as much where a virtual one must get them from its host first.)
 
 use rustix::mm::{self, Advice};
 use std::alloc::{GlobalAlloc, Layout, System};

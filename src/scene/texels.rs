@@ -5,8 +5,8 @@ use crate::image::color::LINEAR_OF_SRGB8;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{LazyLock, OnceLock};
 
-/// Decoded levels, each made when as many of its texels were asked for as it has: pictures seldom need the finest level, one picture
-/// alone hardly ever all of any, and until then each look decodes for itself.
+/// Decoded levels, each made when twice as many of its texels were asked for as it has: pictures seldom need the finest level, one
+/// picture alone hardly ever all of any, and until then each look decodes for itself. Twice, since a level is memory to come by too.
 ///
 /// A level lies row by row. Each row has one texel more, which is what lies right of its last, so that two neighbours always lie side
 /// by side.
@@ -111,12 +111,12 @@ impl<T: Texel> Level<T> {
         [decode(&row[x as usize]), decode(&row[next])]
     }
 
-    /// Say that so many texels were asked for; who asks for the last that is missing decodes the level.
+    /// Say that so many texels were asked for; who asks for the last that it takes decodes the level.
     #[inline(never)]
     pub fn count(&self, t: &Texture, k: usize, texels: usize) {
-        let all = self.stride * self.rows;
+        let enough = 2 * self.stride * self.rows;
         let before = self.asked.fetch_add(texels, Ordering::Relaxed);
-        if before < all && before + texels >= all {
+        if before < enough && before + texels >= enough {
             let _ = self.whole.set(self.decoded(t, k));
         }
     }
@@ -204,7 +204,7 @@ mod tests {
                     level.count(&t, 0, 1);
                     assert_eq!(level.whole().is_some(), made);
                 }
-                level.count(&t, 0, h);
+                level.count(&t, 0, (w + 2) * h);
             }
         }
     }

@@ -3,16 +3,19 @@
 use super::film::Written;
 use super::stats::{Form, Totals};
 use super::time::Frame;
-use super::{Args, Plan, Task, draw, list, plan, scene, usual_size};
+use super::{Args, Plan, Ready, Task, draw, list, plan, scene, usual_size};
 use crate::cli::batch::{self, Names, Outcome};
 use crate::cli::{Failure, load_posed, load_while, print, say, say::Say};
 use sinew::frames::Foresight;
+use sinew::image::Rgba8;
 use sinew::io::manifest::{self, Failed, FileEntry, FrameEntry, Manifest, Output};
 use sinew::io::picture::{AtomicFile, Folder, Target};
 use sinew::io::{Import, Options};
+use sinew::render::Settings;
 use sinew::time::Shard;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use std::time::Instant;
 
 #[derive(clap::Args)]
@@ -63,17 +66,20 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     batch.run()
 }
 
-/// What the camera of the one shot of an import will have to hold, if that can be told so early.
-fn foresee(args: &Args, import: &Import) -> Option<Foresight> {
+/// What the one shot of an import will need, as far as that can be told so early.
+fn foresee(args: &Args, import: &Import) -> Option<Ready> {
     if args.batch.all_clips {
         return None;
     }
     let asset = &import.asset;
     let clip = args.time.clip(import).ok()?;
     let view = args.sheet.view(args.camera.view(asset, scene(import)).ok()?, args.camera.is_default());
-    let settings = args.output.settings(usual_size(import), args.renderer.coverage()).ok()?;
-    let aspect = settings.width as f32 / settings.height as f32;
-    Foresight::new(asset, clip, &view, &args.camera.framing(asset).ok()?, aspect)
+    let Settings { width, height, .. } =
+        args.output.settings(usual_size(import), args.renderer.coverage()).ok()?;
+    let foresight =
+        Foresight::new(asset, clip, &view, &args.camera.framing(asset).ok()?, width as f32 / height as f32);
+    let picture = Rgba8 { width, height, data: vec![0; 4 * width * height] };
+    Some(Ready { foresight, picture: Mutex::new(picture) })
 }
 
 impl<'a> Batch<'a> {
@@ -125,10 +131,11 @@ impl<'a> Batch<'a> {
         }
         let textures = !self.args.batch.dry_run;
         let start = Instant::now();
-        let mut foresight = None;
+        let mut ready = Ready::default();
         let import = match &self.args.time.poses {
             None => {
-                load_while(input, Options { textures }, self.say, &mut |i| foresight = foresee(self.args, i))?
+                let mut meanwhile = |i: &Import| ready = foresee(self.args, i).unwrap_or_default();
+                load_while(input, Options { textures }, self.say, &mut meanwhile)?
             }
             poses => load_posed(input, poses.as_ref(), Options { textures }, self.say)?,
         };
@@ -140,7 +147,7 @@ impl<'a> Batch<'a> {
             false => vec![self.args.time.clip(&import)?],
         };
         for clip in wanted {
-            if let Err(failure) = self.clip(input, &import, foresight.as_ref(), clip) {
+            if let Err(failure) = self.clip(input, &import, &ready, clip) {
                 self.fail(input, failure)?;
             }
         }
@@ -182,7 +189,7 @@ impl<'a> Batch<'a> {
         &mut self,
         input: &Path,
         import: &Import,
-        foresight: Option<&Foresight>,
+        ready: &Ready,
         clip: Option<usize>,
     ) -> Result<(), Failure> {
         let clip_name = clip.map(|c| import.asset.character.clips()[c].name.clone());
@@ -191,7 +198,7 @@ impl<'a> Batch<'a> {
         target.path_of(1).map_or(Ok(()), |path| keep_inputs(self.args, &path))?;
         let companions = self.args.sheet.companions(&target);
         companions.iter().try_for_each(|p| keep_inputs(self.args, p))?;
-        let task = Task { input, import, foresight, clip, target: &target };
+        let task = Task { input, import, ready, clip, target: &target };
         let mut plan = plan(self.args, &task)?;
         self.take_share(&target, &mut plan.frames);
         self.keep_manifest(

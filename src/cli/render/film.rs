@@ -46,6 +46,8 @@ pub struct Job<'a> {
     pub scale: usize,
     /// What a sheet cost so far.
     pub cost: Mutex<Written>,
+    /// Memory for the first picture.
+    pub memory: &'a Mutex<Rgba8>,
 }
 
 impl Job<'_> {
@@ -77,6 +79,11 @@ impl Job<'_> {
         cost.bytes += bytes.len() as u64;
         cost.write += start.elapsed();
         done.map_err(|e| Failure::Run(e.to_string()))
+    }
+
+    /// A picture to draw into: what was made ready, once.
+    fn picture(&self) -> Rgba8 {
+        std::mem::take(&mut self.memory.lock().unwrap_or_else(|e| e.into_inner()))
     }
 
     /// Pixels of a finished frame.
@@ -111,12 +118,14 @@ pub fn write(job: &Job, say: &Say) -> Result<Written, Failure> {
         }
         Format::Exr => {
             let layers = |seen: &Channels| job.beside.layers(seen);
-            stills(job, say, shoot_linear, |p, seen| encode_exr_layers(p, ExrDepth::Float, &layers(seen)))
+            stills(job, say, Image::default, shoot_linear, |p, seen| {
+                encode_exr_layers(p, ExrDepth::Float, &layers(seen))
+            })
         }
-        Format::Webp => stills(job, say, shoot, |p, _| encode_webp(p)),
+        Format::Webp => stills(job, say, || job.picture(), shoot, |p, _| encode_webp(p)),
         _ => match &job.art {
-            Some(art) => stills(job, say, shoot, |p, _| art.encode_png(p, job.level)),
-            None => stills(job, say, shoot, |p, _| encode_png(p, job.level)),
+            Some(art) => stills(job, say, || job.picture(), shoot, |p, _| art.encode_png(p, job.level)),
+            None => stills(job, say, || job.picture(), shoot, |p, _| encode_png(p, job.level)),
         },
     };
     let written = match drawn {
@@ -236,9 +245,10 @@ struct Still {
 ///
 /// Workers write the files, each as soon as it is encoded, and draw into one picture again and again: new memory for every
 /// picture costs more than encoding it.
-fn stills<P: Default>(
+fn stills<P>(
     job: &Job,
     say: &Say,
+    memory: impl Fn() -> P + Sync,
     shoot: Shoot<P>,
     encode: impl Fn(&P, &Channels) -> Result<Vec<u8>, picture::Error> + Sync,
 ) -> Result<Written, Fault> {
@@ -270,7 +280,7 @@ fn stills<P: Default>(
         Ok(still)
     };
     let (mut written, mut fault) = (Written::default(), None);
-    let state = || (Worker::default(), P::default(), Channels::default());
+    let state = || (Worker::default(), memory(), Channels::default());
     let done =
         in_order(job.frames.len(), job.threads, state, still, |_, result: Result<Still, picture::Error>| {
             let received = result.and_then(|s| written.add(s));

@@ -19,6 +19,7 @@ use channels::Beside;
 use film::{Job, Written};
 use sinew::asset::Asset;
 use sinew::frames::{Foresight, Look, Props, Shot, ShotDesc};
+use sinew::image::Rgba8;
 use sinew::io::Import;
 use sinew::io::picture::{Format, Target};
 use sinew::io::scene::{Setting, ours::SceneFile};
@@ -26,6 +27,7 @@ use sinew::render::{Renderer, Settings};
 use sinew::time::Range;
 use stats::Totals;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use std::time::Instant;
 use time::Frame;
 
@@ -87,11 +89,19 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     batch::run(args, say)
 }
 
+/// What was made ready while pictures were decoded.
+#[derive(Default)]
+struct Ready {
+    foresight: Option<Foresight>,
+    /// The first picture's memory, which takes longer to come by than to fill.
+    picture: Mutex<Rgba8>,
+}
+
 /// One output: an asset, one of its clips or rest, and where the pictures go.
 struct Task<'a> {
     input: &'a Path,
     import: &'a Import,
-    foresight: Option<&'a Foresight>,
+    ready: &'a Ready,
     clip: Option<usize>,
     target: &'a Target,
 }
@@ -213,7 +223,7 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
     let start = Instant::now();
     let desc = args.sheet.desc(desc, asset);
     let of_file = args.camera.is_default() && scene.is_some_and(|s| s.camera.is_some());
-    let shot = Shot::foreseen(asset, desc, task.foresight).map_err(|e| match of_file {
+    let shot = Shot::foreseen(asset, desc, task.ready.foresight.as_ref()).map_err(|e| match of_file {
         true => Failure::Input(format!("{}: camera: {e}", task.input.display())),
         false => Failure::Usage(e.to_string()),
     })?;
@@ -238,6 +248,7 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
         bar: if alone { say.picture_progress() } else { indicatif::ProgressBar::hidden() },
         art: None,
         cost: Default::default(),
+        memory: &task.ready.picture,
         scale: args.sheet.pixels.scale(),
     };
     let frames = job.frames.len();

@@ -56,6 +56,9 @@ use setup::Bins;
 use tile::TileScratch;
 use window::View;
 
+/// Triangles from which on another thread is worth its start.
+const SHARE: usize = 1 << 14;
+
 /// Pixels along a tile's side.
 pub(crate) const TILE: usize = 64;
 
@@ -236,12 +239,13 @@ impl Rasterizer {
         self.vertices.fill(self.isa, &frame, threads);
         self.bins.resize_with(threads.max(self.bins.len()), Bins::default);
         let (isa, vertices) = (self.isa, &self.vertices);
-        let shares: Vec<(usize, &mut Bins)> = self.bins[..threads].iter_mut().enumerate().collect();
-        each(shares, |(k, bins)| bins.fill(isa, &frame, vertices, k, threads));
+        let shares = threads.min(1 + frame.triangle_count as usize / SHARE);
+        let tasks: Vec<(usize, &mut Bins)> = self.bins[..shares].iter_mut().enumerate().collect();
+        each(tasks, |(k, bins)| bins.fill(isa, &frame, vertices, k, shares));
 
         // Draw the rows of tiles.
         self.tiles.resize_with(threads.max(self.tiles.len()), TileScratch::default);
-        let bins = &self.bins[..threads];
+        let bins = &self.bins[..shares];
         let rows = std::sync::Mutex::new((tiles.y / TILE..).zip(bands));
         let workers: Vec<&mut TileScratch> = self.tiles[..threads].iter_mut().collect();
         each(workers, |scratch| {
