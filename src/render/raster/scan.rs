@@ -69,6 +69,8 @@ pub(super) struct Entries {
     pub keys: Vec<Key>,
     /// By triangle.
     parts: Vec<Part>,
+    /// Of these the first that belongs to the triangle that was looked for last, or to one after it.
+    next_part: usize,
     /// What is in no chain: keys and triangles.
     pub loose: Vec<Key>,
     pub loose_ids: Vec<u32>,
@@ -78,6 +80,7 @@ impl Entries {
     fn start(&mut self) {
         self.chains.clear();
         self.parts.clear();
+        self.next_part = 0;
         self.loose.clear();
         self.loose_ids.clear();
     }
@@ -142,8 +145,12 @@ impl Entries {
         }
         let mut whole = n;
         if !self.parts.is_empty() {
-            let from = self.parts.partition_point(|p| p.id < id);
-            for part in self.parts[from..].iter_mut().take_while(|p| p.id == id && !p.listed) {
+            // Most triangles come in the order of their numbers.
+            if self.next_part > 0 && self.parts[self.next_part - 1].id >= id {
+                self.next_part = self.parts.partition_point(|p| p.id < id);
+            }
+            self.next_part += self.parts[self.next_part..].iter().take_while(|p| p.id < id).count();
+            for part in self.parts[self.next_part..].iter_mut().take_while(|p| p.id == id && !p.listed) {
                 (keys[n], part.listed) = (part.key, true);
                 n += 1;
             }
