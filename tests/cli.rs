@@ -161,6 +161,11 @@ fn what_a_rig_lacks_or_loses_is_said() {
     std::fs::write(&broken, r#"{"sinew_rig": 1, "bones": 3}"#).unwrap();
     let (code, wrong) = fails(&["info", &broken]);
     assert!(code == 3 && wrong.matches("broken.json").count() == 1 && wrong.contains("column 27"), "{wrong}");
+    let cut = path(&dir, "cut.glb");
+    std::fs::write(&cut, b"glTF\x02\0\0\0\xff\0\0\0").unwrap();
+    let (code, wrong) = fails(&["bake", &cut, "-o", &path(&dir, "out.glb")]);
+    assert!(code == 3 && wrong.matches("cut.glb").count() == 1, "{wrong}");
+    assert!(wrong.contains("byte 8: expected 255 bytes, as the header says, found 12"), "{wrong}");
 
     // A rig that was copied without its poses.
     let rig = std::fs::read_to_string(&input).unwrap().replace(",\n  \"poses\": [\"flag.poses.json\"]", "");

@@ -83,7 +83,7 @@ impl File {
     }
 
     fn result(&self) -> Result<Import, GltfError> {
-        import_bytes(&self.bytes(), None, "test.glb", &Options::default())
+        import_bytes(&self.bytes(), None, &Options::default())
     }
 
     fn error(&self) -> String {
@@ -333,8 +333,7 @@ fn uris_stay_in_their_folder() {
         let mut json = File::new().json;
         json["buffers"] = json!([{ "byteLength": 60, "uri": uri }]);
         let text = format!("\u{feff}{json}");
-        import_bytes(text.as_bytes(), Some(&inner), "test.gltf", &Options::default())
-            .map_err(|e| e.to_string())
+        import_bytes(text.as_bytes(), Some(&inner), &Options::default()).map_err(|e| e.to_string())
     };
     assert!(
         try_uri("ü%201.bin").is_ok() && try_uri("%C3%BC 1.bin").is_ok() && try_uri("x/../ü 1.bin").is_err()
@@ -358,7 +357,7 @@ fn uris_stay_in_their_folder() {
 fn cut_off_anywhere_is_an_error() {
     let whole = skinned().bytes();
     for end in 0..whole.len() {
-        let e = import_bytes(&whole[..end], None, "cut", &Options::default()).expect_err("cut off");
+        let e = import_bytes(&whole[..end], None, &Options::default()).expect_err("cut off");
         assert!(!e.to_string().is_empty());
     }
 }
@@ -397,7 +396,7 @@ fn a_file_behind_many_buffers_is_read_once_and_a_huge_one_never() {
     let read = |uri: &str| {
         let mut json = File::new().json;
         json["buffers"] = json!(vec![json!({ "byteLength": 60, "uri": uri }); 1000]);
-        import_bytes(json.to_string().as_bytes(), Some(&folder), "test.gltf", &Options::default())
+        import_bytes(json.to_string().as_bytes(), Some(&folder), &Options::default())
     };
     let (many, huge) = (read("a.bin"), read("huge.bin"));
     std::fs::remove_dir_all(&folder).unwrap();
@@ -428,7 +427,7 @@ fn pictured(pictures: &[usize], look: impl Fn(usize) -> Value) -> Import {
     let count = 0..pictures.len();
     file.json["textures"] = json!(count.clone().map(|i| json!({ "source": i })).collect::<Vec<_>>());
     file.json["materials"] = json!(count.map(look).collect::<Vec<_>>());
-    import_bytes(&file.bytes(), None, "test.glb", &Options { textures: true }).unwrap()
+    import_bytes(&file.bytes(), None, &Options { textures: true }).unwrap()
 }
 
 #[cfg(feature = "pictures")]
@@ -455,7 +454,7 @@ fn materials_that_nothing_drawn_uses_go_without_maps() {
     file.json["textures"] = json!([{ "source": 0 }]);
     file.json["materials"] = json!([look, look]);
     file.primitive()["material"] = json!(1);
-    let import = import_bytes(&file.bytes(), None, "test.glb", &Options { textures: true }).unwrap();
+    let import = import_bytes(&file.bytes(), None, &Options { textures: true }).unwrap();
     let maps: Vec<bool> = import.asset.materials.iter().map(|m| m.diffuse_map.is_some()).collect();
     assert_eq!((maps, import.asset.textures.len()), (vec![false, true], 2));
 }

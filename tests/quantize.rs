@@ -85,7 +85,7 @@ fn troupe() -> Vec<u8> {
 }
 
 fn import(bytes: &[u8]) -> Import {
-    gltf::import_bytes(bytes, None, "troupe.glb", &Options::default()).unwrap()
+    gltf::import_bytes(bytes, None, &Options::default()).unwrap()
 }
 
 /// All vertices at a time, by the name of the node of old that carries them and by mesh and primitive.
@@ -120,14 +120,8 @@ fn quantized(bytes: &[u8], form: MeshForm) -> (Rewritten, Vec<usize>) {
     let import = import(bytes);
     let clips = import.asset.character.clips();
     let new = NewClip { clip: &clips[0], short: &[], replaces: Some(0), carried: None };
-    let mut out = gltf::changed(
-        bytes,
-        None,
-        "troupe.glb",
-        &import,
-        gltf::Change { clips: &[new], ..Default::default() },
-    )
-    .unwrap();
+    let mut out =
+        gltf::changed(bytes, None, &import, gltf::Change { clips: &[new], ..Default::default() }).unwrap();
     let groups = out.quantize(&[0, 1].map(|g| (g, form)).into()).unwrap();
     (out, groups)
 }
@@ -260,7 +254,7 @@ fn integers_and_clips_share_one_tolerance() {
     // Without a clip the rest counts.
     let mut still = source.clone();
     still.asset.character = still.asset.character.with_clips(vec![]).unwrap();
-    let file = gltf::changed(&troupe(), None, "in.glb", &still, Default::default()).unwrap();
+    let file = gltf::changed(&troupe(), None, &still, Default::default()).unwrap();
     std::fs::write(&input, file.glb()).unwrap();
     assert!(baked(&dir, &input, &["--quantize-mesh"]).unwrap().len() < file.glb().len());
     // A rig of ours is no glTF.

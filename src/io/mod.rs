@@ -170,7 +170,7 @@ fn read_import(
         Format::Notes => Ok(notes::import_bytes(&bytes, folder, options)?),
         Format::Gltf => {
             let folder = if folder.as_os_str().is_empty() { std::path::Path::new(".") } else { folder };
-            Ok(gltf::import_while(&bytes, Some(folder), &path.display().to_string(), options, meanwhile)?)
+            Ok(gltf::import_while(&bytes, Some(folder), options, meanwhile)?)
         }
         Format::Rig => Ok(rig_json::import(path, options)?),
         Format::NotesScene | Format::Scene if !scenes => {

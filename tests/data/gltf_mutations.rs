@@ -42,8 +42,7 @@ pub fn run(data: &Path) -> Result<(), String> {
 
 /// Import, then pose and deform everything.
 fn try_import(bytes: &[u8]) -> Result<(), String> {
-    let import =
-        gltf::import_bytes(bytes, None, "mutated", &Options { textures: true }).map_err(|e| e.to_string())?;
+    let import = gltf::import_bytes(bytes, None, &Options { textures: true }).map_err(|e| e.to_string())?;
     let c = &import.asset.character;
     for clip in [None, Some(0)].into_iter().filter(|c2| c2.is_none_or(|i| i < c.clips().len())) {
         let pose = c.pose(clip, 0.3);

@@ -148,10 +148,9 @@ pub fn gltf(
             let folder = source.path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
             let import =
                 io::import(&source.path, &Options::default()).map_err(|e| named(&source.path, &e))?;
-            let name = source.path.display().to_string();
             let bad = |e: gltf::GltfError| named(&source.path, &e);
             let change = gltf::Change { clips: &new, ..Default::default() };
-            let mut out = gltf::changed(&bytes, Some(folder), &name, &import, change).map_err(bad)?;
+            let mut out = gltf::changed(&bytes, Some(folder), &import, change).map_err(bad)?;
             out.embed_pictures(Some(folder)).map_err(bad)?;
             (out, vec![])
         }

@@ -289,7 +289,7 @@ fn frozen(
     if import.format == "glTF" {
         let bytes = io::read_file(input).map_err(|e| bad(&e))?;
         let folder = input.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        gltf::wear(&mut out, &bytes, Some(folder), &input.display().to_string()).map_err(|e| bad(&e))?;
+        gltf::wear(&mut out, &bytes, Some(folder)).map_err(|e| bad(&e))?;
         out.embed_pictures(Some(folder)).map_err(|e| bad(&e))?;
     }
     write::put(args, output, &out)

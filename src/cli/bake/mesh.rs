@@ -88,7 +88,7 @@ fn tried(
 ) -> Result<Trial, String> {
     let mut out = file.clone();
     let groups = out.quantize(forms).map_err(|e| e.to_string())?;
-    let other = gltf::import_bytes(&out.glb(), None, "vertices in integers", &Options { textures: false });
+    let other = gltf::import_bytes(&out.glb(), None, &Options { textures: false });
     let character = gltf::vertices_of(import, &other.map_err(|e| e.to_string())?)
         .ok_or("--quantize-mesh: its vertices cannot be compared with what becomes of them")?;
     let (cost, instance) = worst(&import.asset.character, &character, edited, desc);

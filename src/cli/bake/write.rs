@@ -136,9 +136,8 @@ pub(super) fn rewritten(
             carried: Some(&d.edited.carried),
         })
         .collect();
-    let name = input.display().to_string();
     let change = gltf::Change { clips: &clips, extras, influences: args.forms.limits() };
-    gltf::changed(&bytes, Some(folder(input)), &name, import, change).map_err(|e| bad(&e))
+    gltf::changed(&bytes, Some(folder(input)), import, change).map_err(|e| bad(&e))
 }
 
 /// Bytes cannot move where more may be said of them than is known.
@@ -156,7 +155,7 @@ pub(super) fn beyond(args: &Args, input: &Path, import: &Import) -> Result<Vec<V
     }
     let bad = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", input.display()));
     let bytes = io::read_file(input).map_err(|e| bad(&e))?;
-    gltf::carried(&bytes, Some(folder(input)), &input.display().to_string()).map_err(|e| bad(&e))
+    gltf::carried(&bytes, Some(folder(input))).map_err(|e| bad(&e))
 }
 
 /// What the clips' edits leave to be said.

@@ -45,8 +45,8 @@ impl Carried {
 ///
 /// # Errors
 /// [`GltfError`](super::GltfError) as for importing.
-pub fn carried(bytes: &[u8], base_dir: Option<&Path>, name: &str) -> Result<Vec<Vec<Carried>>> {
-    let parts = container::split(bytes, name)?;
+pub fn carried(bytes: &[u8], base_dir: Option<&Path>) -> Result<Vec<Vec<Carried>>> {
+    let parts = container::split(bytes)?;
     let mut w = Warnings::default();
     let doc = Document::new(mend::root(parts.json, &mut w)?, parts.bin, base_dir, &mut w)?;
     let json: Value =

@@ -15,16 +15,7 @@ pub(super) struct Parts<'a> {
 }
 
 /// Find the JSON and the binary chunk.
-pub(super) fn split<'a>(bytes: &'a [u8], name: &str) -> Result<Parts<'a>> {
-    parts(bytes).map_err(|mut e| {
-        if let GltfError::Container { file, .. } = &mut e {
-            *file = name.into();
-        }
-        e
-    })
-}
-
-fn parts(bytes: &[u8]) -> Result<Parts<'_>> {
+pub(super) fn split(bytes: &[u8]) -> Result<Parts<'_>> {
     let Some(rest) = bytes.strip_prefix(MAGIC) else {
         let json = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
         let first = json.iter().position(|b| !b.is_ascii_whitespace());
@@ -72,10 +63,5 @@ fn chunks(bytes: &[u8]) -> Result<Parts<'_>> {
 }
 
 fn broken(offset: usize, expected: &str, found: impl Into<String>) -> GltfError {
-    GltfError::Container {
-        file: String::new(),
-        offset: offset as u64,
-        expected: expected.into(),
-        found: found.into(),
-    }
+    GltfError::Container { offset: offset as u64, expected: expected.into(), found: found.into() }
 }

@@ -20,10 +20,8 @@ pub enum GltfError {
         source: std::io::Error,
     },
     /// Bytes that are neither GLB nor JSON, or a GLB whose lengths do not hold.
-    #[error("`{file}`, byte {offset}: expected {expected}, found {found}; the file is damaged or no glTF")]
+    #[error("byte {offset}: expected {expected}, found {found}; the file is damaged or no glTF")]
     Container {
-        /// What the caller calls the file.
-        file: String,
         /// Where in the file.
         offset: u64,
         /// What should be there.

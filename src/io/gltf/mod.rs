@@ -58,11 +58,11 @@ use warnings::Warnings;
 /// ```
 /// use sinew::io::{Options, gltf};
 /// let text = br#"{ "asset": { "version": "2.0" }, "nodes": [{ "name": "hip" }, { "name": "hip" }] }"#;
-/// let import = gltf::import_bytes(text, None, "two-hips.gltf", &Options::default()).unwrap();
+/// let import = gltf::import_bytes(text, None, &Options::default()).unwrap();
 /// assert_eq!(import.asset.character.skeleton().len(), 2);
 /// assert!(import.warnings[0].to_string().starts_with("nodes[1].name: "));
-/// let e = gltf::import_bytes(b"glTF", None, "cut.glb", &Options::default()).unwrap_err();
-/// assert!(e.to_string().starts_with("`cut.glb`, byte 4: expected a GLB version"));
+/// let e = gltf::import_bytes(b"glTF", None, &Options::default()).unwrap_err();
+/// assert!(e.to_string().starts_with("byte 4: expected a GLB version"));
 /// ```
 ///
 /// # Errors
@@ -72,32 +72,30 @@ pub fn import(path: &Path, options: &Options) -> std::result::Result<Import, Glt
     let read = |source| GltfError::Read { place: "file".into(), file: file(), source };
     let bytes = super::read_file(path).map_err(read)?;
     let folder = path.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p });
-    import_bytes(&bytes, folder, &file(), options)
+    import_bytes(&bytes, folder, options)
 }
 
-/// Read a file's bytes; `name` is what messages call it. `base_dir` is where its relative URIs are looked up; without one they are errors.
+/// Read a file's bytes; `base_dir` is where its relative URIs are looked up; without one they are errors.
 ///
 /// # Errors
 /// [`GltfError`], with the place in the file, what was expected and what was found.
 pub fn import_bytes(
     bytes: &[u8],
     base_dir: Option<&Path>,
-    name: &str,
     options: &Options,
 ) -> std::result::Result<Import, GltfError> {
-    import_while(bytes, base_dir, name, options, &mut |_| ())
+    import_while(bytes, base_dir, options, &mut |_| ())
 }
 
 /// [`import_bytes`], and what [`super::import_while`] says.
 pub(super) fn import_while(
     bytes: &[u8],
     base_dir: Option<&Path>,
-    name: &str,
     options: &Options,
     meanwhile: &mut dyn FnMut(&Import),
 ) -> Result<Import> {
     let mut w = Warnings::default();
-    let parts = container::split(bytes, name)?;
+    let parts = container::split(bytes)?;
     std::thread::scope(|scope| {
         let ahead = options.textures.then(|| pictures::Ahead::begin(scope, &parts)).flatten();
         let root = mend::root(parts.json, &mut w)?;

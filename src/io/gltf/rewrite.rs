@@ -54,15 +54,9 @@ pub struct Change<'a> {
 ///
 /// # Errors
 /// [`GltfError`](super::GltfError) as for importing, or if a clip moves what the file has no node for, or influences are not of its vertices.
-pub fn changed(
-    bytes: &[u8],
-    base_dir: Option<&Path>,
-    name: &str,
-    import: &Import,
-    change: Change,
-) -> Result<Rewritten> {
+pub fn changed(bytes: &[u8], base_dir: Option<&Path>, import: &Import, change: Change) -> Result<Rewritten> {
     let Change { clips, extras, influences: influenced } = change;
-    let parts = container::split(bytes, name)?;
+    let parts = container::split(bytes)?;
     let mut w = Warnings::default();
     let doc = Document::new(mend::root(parts.json, &mut w)?, parts.bin, base_dir, &mut w)?;
     let mut json: Map<String, Value> =

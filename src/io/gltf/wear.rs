@@ -16,8 +16,8 @@ const LOOKS: [&str; 3] = ["KHR_materials_", "KHR_texture_", "EXT_texture_"];
 ///
 /// # Errors
 /// [`GltfError`](super::GltfError) as for importing.
-pub fn wear(out: &mut Rewritten, bytes: &[u8], base_dir: Option<&Path>, name: &str) -> Result<()> {
-    let parts = container::split(bytes, name)?;
+pub fn wear(out: &mut Rewritten, bytes: &[u8], base_dir: Option<&Path>) -> Result<()> {
+    let parts = container::split(bytes)?;
     let mut w = Warnings::default();
     let doc = Document::new(mend::root(parts.json, &mut w)?, parts.bin, base_dir, &mut w)?;
     let mut from: Map<String, Value> =
