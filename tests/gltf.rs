@@ -474,7 +474,7 @@ fn maps_without_room_are_left_out() {
     let import = pictured(&[3], |_| json!({ "emissiveTexture": { "index": 0 } }));
     assert_eq!(import.warnings[0].place, "images[0]");
     assert!(import.warnings[0].message.contains("256 MiB"), "{:?}", import.warnings);
-    assert_eq!(import.asset.textures[0].levels(), [vec![255; 4]]);
+    assert_eq!(import.asset.textures[0].levels(), [vec![255; 3]]);
 }
 
 #[test]

@@ -196,7 +196,7 @@ fn a_rig_of_angles_becomes_gltf_and_comes_back() {
     assert!(read.warnings.is_empty(), "{:?}", read.warnings);
     let c = &read.asset.character;
     assert!(apart(&truth, &film(c, &c.clips()[0])) <= 2e-3);
-    assert_eq!(read.asset.textures[0].levels()[0], [9, 8, 7, 255]);
+    assert_eq!(read.asset.textures[0].rgba(), [9, 8, 7, 255]);
     assert_eq!((c.rest_pose().weights, c.meshes().iter().map(|m| m.uvs[0].len()).sum()), (vec![0.25], 12));
     assert_eq!(c.skeleton().name(BoneId(2)), "b2");
 }

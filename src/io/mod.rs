@@ -186,6 +186,15 @@ fn read_import(
     }
 }
 
+/// Bytes of a decoded picture, four a pixel, or three where it has no alpha.
+#[cfg(all(feature = "io", feature = "pictures"))]
+fn codes(picture: image::DynamicImage) -> Vec<u8> {
+    match picture.color().has_alpha() {
+        true => picture.into_rgba8().into_raw(),
+        false => picture.into_rgb8().into_raw(),
+    }
+}
+
 /// All bytes of a plain file; a folder, a pipe or a device is refused, since it may never end.
 ///
 /// # Errors

@@ -3,7 +3,7 @@
 use crate::image::color::LINEAR_OF_SRGB8;
 use crate::math::power;
 use crate::math::simd::{self, F, I, Isa, Kernel};
-use crate::scene::texels::{Level, PACKED};
+use crate::scene::texels::{Level, PACKED, texel};
 use crate::scene::{Filter, Texture, WrapMode};
 use std::sync::LazyLock;
 
@@ -160,15 +160,14 @@ fn fetch<const N: usize>(t: &Texture, level: I<N>, at: I<N>) -> I<N> {
     let mut out = I::ZERO;
     let first = level.0[0] as usize;
     if level == I::splat(level.0[0]) {
-        let texels = t.levels()[first].as_chunks::<4>().0;
+        let texels = &t.levels()[first];
         for k in 0..N {
-            out.0[k] = i32::from_le_bytes(texels[at.0[k] as usize]);
+            out.0[k] = i32::from_le_bytes(texel(t, texels, at.0[k] as usize));
         }
         return out;
     }
     for k in 0..N {
-        let texels = t.levels()[level.0[k] as usize].as_chunks::<4>().0;
-        out.0[k] = i32::from_le_bytes(texels[at.0[k] as usize]);
+        out.0[k] = i32::from_le_bytes(texel(t, &t.levels()[level.0[k] as usize], at.0[k] as usize));
     }
     out
 }
@@ -373,6 +372,33 @@ mod tests {
     use super::*;
     use crate::scene::{Content, Texture};
     use crate::test_rng::Rng;
+
+    #[test]
+    fn a_texture_without_alpha_looks_like_an_opaque_one() {
+        let mut rng = Rng::new(8);
+        let rgb: Vec<u8> = (0..3 * 20 * 9).map(|_| rng.range(0.0, 256.0) as u8).collect();
+        let rgba = rgb.chunks(3).flat_map(|t| [t[0], t[1], t[2], 255]).collect::<Vec<u8>>();
+        let cases =
+            [Content::Color, Content::Numbers].map(|c| [(c, Filter::Trilinear), (c, Filter::Nearest)]);
+        for (content, filter) in cases.into_iter().flatten() {
+            let of = |bytes: &Vec<u8>| {
+                Texture::new(20, 9, bytes.clone(), content, [WrapMode::Repeat; 2], filter).expect("it fits")
+            };
+            let (three, four) = (of(&rgb), of(&rgba));
+            assert_eq!((three.channels(), three.rgba()), (3, rgba.clone()));
+            // Before a level is decoded and after.
+            for _ in 0..300 {
+                let mut number = |lo: f64, hi: f64| F::<8>([0.0; 8].map(|_: f32| rng.range(lo, hi) as f32));
+                let (u, v, right) = (number(-2.0, 2.0), number(-2.0, 2.0), [number(0.001, 0.3), F::ZERO]);
+                let uv = Uv { u, v, right, down: [F::ZERO, number(0.001, 0.3)] };
+                assert_eq!(sample(Isa::Best, &three, &uv), sample(Isa::Best, &four, &uv));
+            }
+        }
+        assert!(
+            Texture::new(20, 9, vec![0; 5 * 180], Content::Color, [WrapMode::Repeat; 2], Filter::Nearest)
+                .is_err()
+        );
+    }
 
     #[test]
     fn batches_at_once_are_what_each_is() {

@@ -1,5 +1,6 @@
 //! Mip levels as filters read them: decoded once, not at every look.
 
+use super::texture::opaque;
 use super::{Texture, WrapMode};
 use crate::image::color::LINEAR_OF_SRGB8;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -106,9 +107,9 @@ impl<T: Texel> Level<T> {
         let decode = T::decode(t);
         let width = self.stride - 1;
         let (y, x) = (place as u32 / self.stride as u32, place as u32 % self.stride as u32);
-        let row = &t.levels()[k].as_chunks::<4>().0[y as usize * width..][..width];
         let next = if x as usize + 1 < width { x as usize + 1 } else { beyond(t, width) };
-        [decode(&row[x as usize]), decode(&row[next])]
+        let level = &t.levels()[k];
+        [x as usize, next].map(|x| decode(&texel(t, level, y as usize * width + x)))
     }
 
     /// Say that so many texels were asked for; who asks for the last that it takes decodes the level.
@@ -123,12 +124,24 @@ impl<T: Texel> Level<T> {
 
     fn decoded(&self, t: &Texture, k: usize) -> Vec<T> {
         let (decode, width) = (T::decode(t), self.stride - 1);
-        let mut out = Vec::with_capacity(self.stride * self.rows);
-        for row in t.levels()[k].as_chunks::<4>().0.chunks_exact(width) {
-            out.extend(row.iter().map(&decode));
-            out.push(decode(&row[beyond(t, width)]));
+        let (mut out, level) = (Vec::with_capacity(self.stride * self.rows), &t.levels()[k]);
+        for row in level.chunks_exact(t.channels() * width) {
+            match t.channels() {
+                3 => out.extend(row.as_chunks::<3>().0.iter().map(|t| decode(&opaque(t)))),
+                _ => out.extend(row.as_chunks::<4>().0.iter().map(&decode)),
+            }
+            out.push(decode(&texel(t, row, beyond(t, width))));
         }
         out
+    }
+}
+
+/// A pixel of a level, or of a row of it, as RGBA.
+#[inline(always)]
+pub(crate) fn texel(t: &Texture, level: &[u8], place: usize) -> [u8; 4] {
+    match t.channels() {
+        3 => opaque(&level.as_chunks::<3>().0[place]),
+        _ => level.as_chunks::<4>().0[place],
     }
 }
 

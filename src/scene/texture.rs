@@ -39,7 +39,7 @@ pub enum Content {
     Numbers,
 }
 
-/// Decoded 8-bit RGBA with its mip chain.
+/// Decoded 8-bit RGB or RGBA with its mip chain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
     width: u32,
@@ -47,6 +47,7 @@ pub struct Texture {
     content: Content,
     wrap: [WrapMode; 2],
     filter: Filter,
+    channels: usize,
     levels: Vec<Vec<u8>>,
     /// The same for filters, made when they are first needed.
     texels: Texels,
@@ -54,38 +55,41 @@ pub struct Texture {
 
 /// Pixels that make no texture.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("a {width}×{height} texture needs {expected} bytes (4 a pixel, at least one pixel), found {found}")]
+#[error(
+    "a {width}×{height} texture needs {expected} bytes (3 or 4 a pixel, at least one pixel), found {found}"
+)]
 pub struct TextureError {
     /// Pixels a row.
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// `4 · width · height`.
+    /// `4 · width · height`; a quarter less without alpha.
     pub expected: u64,
     /// Bytes given.
     pub found: u64,
 }
 
 impl Texture {
-    /// Build from RGBA bytes, rows from the top.
+    /// Build from RGBA bytes, or RGB where all of it is opaque, rows from the top.
     ///
     /// # Errors
     /// [`TextureError`] where the bytes do not fit the size.
     pub fn new(
         width: u32,
         height: u32,
-        rgba: Vec<u8>,
+        bytes: Vec<u8>,
         content: Content,
         wrap: [WrapMode; 2],
         filter: Filter,
     ) -> Result<Self, TextureError> {
-        let expected = 4 * width as u64 * height as u64;
-        if expected == 0 || rgba.len() as u64 != expected {
-            return Err(TextureError { width, height, expected, found: rgba.len() as u64 });
+        let (pixels, found) = (width as u64 * height as u64, bytes.len() as u64);
+        if pixels == 0 || (found != 3 * pixels && found != 4 * pixels) {
+            return Err(TextureError { width, height, expected: 4 * pixels, found });
         }
-        let (levels, opaque) = super::mips::chain(width, height, rgba, content);
+        let channels = (found / pixels) as usize;
+        let (levels, opaque) = super::mips::chain(width, height, bytes, channels, content);
         let texels = Texels::new(width, height, levels.len(), opaque && content != Content::Numbers);
-        Ok(Self { width, height, content, wrap, filter, levels, texels })
+        Ok(Self { width, height, content, wrap, filter, channels, levels, texels })
     }
 
     /// Pixels a row of the finest level.
@@ -113,9 +117,23 @@ impl Texture {
         self.filter
     }
 
-    /// RGBA bytes of a level; 0 is the finest, each next one half as large.
+    /// Bytes of a pixel: 4, or 3 where there is no alpha.
+    pub fn channels(&self) -> usize {
+        self.channels
+    }
+
+    /// Bytes of the levels; 0 is the finest, each next one half as large.
     pub fn levels(&self) -> &[Vec<u8>] {
         &self.levels
+    }
+
+    /// RGBA bytes of the finest level.
+    pub fn rgba(&self) -> Vec<u8> {
+        let finest = &self.levels[0];
+        match self.channels {
+            3 => finest.as_chunks::<3>().0.iter().flat_map(opaque).collect(),
+            _ => finest.clone(),
+        }
     }
 
     /// The levels for filters, if they are packed.
@@ -135,4 +153,10 @@ impl Texture {
             Texels::Wide(levels) => levels,
         }
     }
+}
+
+/// A pixel without alpha.
+#[inline(always)]
+pub(super) fn opaque(&[r, g, b]: &[u8; 3]) -> [u8; 4] {
+    [r, g, b, 255]
 }

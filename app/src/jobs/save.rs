@@ -91,8 +91,7 @@ fn poses_of(
 fn pictures(asset: &Asset) -> Result<Vec<Vec<u8>>, String> {
     let encode = |t: &sinew::scene::Texture| {
         let (width, height) = (t.width() as usize, t.height() as usize);
-        let data = t.levels().first().cloned().unwrap_or_default();
-        encode_png(&Rgba8 { width, height, data }, PngLevel::Balanced).map_err(|e| e.to_string())
+        encode_png(&Rgba8 { width, height, data: t.rgba() }, PngLevel::Balanced).map_err(|e| e.to_string())
     };
     asset.textures.iter().map(encode).collect()
 }

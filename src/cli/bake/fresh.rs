@@ -31,7 +31,7 @@ pub(super) fn gltf(
 
 fn png(texture: &Texture) -> Result<Vec<u8>, Failure> {
     let [width, height] = [texture.width(), texture.height()].map(|n| n as usize);
-    let picture = Rgba8 { width, height, data: texture.levels()[0].clone() };
+    let picture = Rgba8 { width, height, data: texture.rgba() };
     encode_png(&picture, PngLevel::Balanced).map_err(|e| Failure::Run(e.to_string()))
 }
 

@@ -61,7 +61,8 @@ pub(super) type Size = (usize, usize);
 /// Pixels that are looked up at the places of another grid.
 pub(super) struct Grid<'p> {
     pub size: Size,
-    pub rgba: &'p [u8],
+    /// RGB or RGBA.
+    pub bytes: &'p [u8],
     pub wrap: [WrapMode; 2],
     /// RGB are sRGB codes, to be mixed in linear light.
     pub srgb: bool,
@@ -72,8 +73,13 @@ type Between = ([usize; 2], f32);
 
 impl Grid<'_> {
     fn pixel(&self, x: usize, y: usize) -> [u8; 4] {
-        let i = (y * self.size.0 + x) * 4;
-        [self.rgba[i], self.rgba[i + 1], self.rgba[i + 2], self.rgba[i + 3]]
+        let n = self.channels();
+        let p = &self.bytes[(y * self.size.0 + x) * n..][..n];
+        [p[0], p[1], p[2], p.get(3).copied().unwrap_or(255)]
+    }
+
+    fn channels(&self) -> usize {
+        self.bytes.len() / (self.size.0 * self.size.1).max(1)
     }
 
     /// What lies under the centre of a pixel of another grid: bilinear.
@@ -96,9 +102,10 @@ impl Grid<'_> {
     }
 
     fn mean(&self) -> [u8; 4] {
-        let count = (self.rgba.len() / 4).max(1) as u64;
-        let sum = |k: usize| self.rgba.iter().skip(k).step_by(4).map(|&b| b as u64).sum::<u64>();
-        std::array::from_fn(|k| (sum(k) / count) as u8)
+        let n = self.channels();
+        let count = (self.bytes.len() / n).max(1) as u64;
+        let sum = |k: usize| self.bytes.iter().skip(k).step_by(n).map(|&b| b as u64).sum::<u64>();
+        std::array::from_fn(|k| if k < n { (sum(k) / count) as u8 } else { 255 })
     }
 }
 
@@ -177,7 +184,7 @@ mod tests {
     #[test]
     fn coarser_pictures_are_magnified_smoothly() {
         let rgba = [[0, 0, 0, 0], [255; 4]].concat();
-        let mut grid = Grid { size: (2, 1), rgba: &rgba, wrap: [WrapMode::Clamp; 2], srgb: false };
+        let mut grid = Grid { size: (2, 1), bytes: &rgba, wrap: [WrapMode::Clamp; 2], srgb: false };
         let row = |g: &Grid| (0..8).map(|x| g.at((x, 0), (8, 1))[1]).collect::<Vec<u8>>();
         assert_eq!(row(&grid), [0, 0, 32, 96, 159, 223, 255, 255]);
         grid.srgb = true;

@@ -28,16 +28,16 @@ pub(super) fn with_mips(width: usize, height: usize) -> u64 {
     (4 * width as u64 * height as u64).saturating_mul(4).div_ceil(3)
 }
 
-/// Decoded RGBA, rows from the top.
+/// Decoded RGBA, or RGB where there is no alpha, rows from the top.
 pub(super) struct Picture {
     pub width: usize,
     pub height: usize,
-    pub rgba: Vec<u8>,
+    pub bytes: Vec<u8>,
 }
 
 impl Picture {
     fn white() -> Self {
-        Self { width: 1, height: 1, rgba: vec![255; 4] }
+        Self { width: 1, height: 1, bytes: vec![255; 3] }
     }
 }
 
@@ -253,7 +253,7 @@ fn decode(bytes: &[u8]) -> Result<Picture, String> {
     }
 }
 
-/// A JPEG of luma and chroma straight into RGBA: without a copy in RGB, which costs as much again in fresh memory.
+/// A JPEG of luma and chroma straight into RGB.
 ///
 /// `None` where it is anything else, or where something is wrong that [`decode_any`] can name.
 #[cfg(feature = "pictures")]
@@ -263,7 +263,7 @@ fn decode_jpeg(bytes: &[u8]) -> Option<Picture> {
         return None;
     }
     let options = DecoderOptions::default()
-        .jpeg_set_out_colorspace(ColorSpace::RGBA)
+        .jpeg_set_out_colorspace(ColorSpace::RGB)
         .set_strict_mode(false)
         .set_max_width(SIDE as usize)
         .set_max_height(SIDE as usize);
@@ -273,11 +273,10 @@ fn decode_jpeg(bytes: &[u8]) -> Option<Picture> {
     if decoder.input_colorspace()? != ColorSpace::YCbCr {
         return None;
     }
-    let mut rgba = vec![0; 4 * width * height];
-    decoder.decode_into(&mut rgba).ok()?;
-    // Rows that a file cut short does not hold stay blank; they are to be black and opaque, as without this short way.
-    let whole = rgba.chunks_exact(4 * width).all(|row| row.ends_with(&[255]));
-    whole.then_some(Picture { width, height, rgba })
+    // Rows that a file cut short does not hold stay black, as without this short way.
+    let mut bytes = vec![0; 3 * width * height];
+    decoder.decode_into(&mut bytes).ok()?;
+    Some(Picture { width, height, bytes })
 }
 
 #[cfg(feature = "pictures")]
@@ -289,8 +288,9 @@ fn decode_any(bytes: &[u8]) -> Result<Picture, String> {
     // Decoders may hold 16 bits a channel.
     limits.max_alloc = Some(2 * PIXEL_BYTES);
     reader.limits(limits);
-    let rgba = reader.decode().map_err(|e| e.to_string())?.into_rgba8();
-    Ok(Picture { width: rgba.width() as usize, height: rgba.height() as usize, rgba: rgba.into_raw() })
+    let picture = reader.decode().map_err(|e| e.to_string())?;
+    let (width, height) = (picture.width() as usize, picture.height() as usize);
+    Ok(Picture { width, height, bytes: crate::io::codes(picture) })
 }
 
 #[cfg(feature = "pictures")]
@@ -361,7 +361,7 @@ mod tests {
     }
 
     #[test]
-    fn the_short_way_into_rgba_gives_the_same_pixels() {
+    fn the_short_way_into_rgb_gives_the_same_pixels() {
         for (w, h) in [(1, 1), (16, 16), (61, 47), (200, 9)] {
             let pixels = (0..w * h * 3).map(|i| (i * 37 % 251 + i / 7 % 40).min(255) as u8).collect();
             let picture = image::RgbImage::from_raw(w, h, pixels).unwrap();
@@ -369,11 +369,11 @@ mod tests {
             picture.write_to(&mut bytes, image::ImageFormat::Jpeg).unwrap();
             let (short, long) = (decode_jpeg(bytes.get_ref()).unwrap(), decode_any(bytes.get_ref()).unwrap());
             assert_eq!((short.width, short.height), (w as usize, h as usize));
-            assert!(short.rgba == long.rgba);
+            assert!(short.bytes == long.bytes);
             // What is cut off is named, or read alike.
             for n in [2, 100, bytes.get_ref().len() / 2] {
                 let cut = &bytes.get_ref()[..n.min(bytes.get_ref().len())];
-                assert_eq!(decode(cut).map(|p| p.rgba), decode_any(cut).map(|p| p.rgba));
+                assert_eq!(decode(cut).map(|p| p.bytes), decode_any(cut).map(|p| p.bytes));
             }
         }
         let grey = image::GrayImage::from_pixel(5, 4, image::Luma([7]));

@@ -128,14 +128,14 @@ impl<'a> Textures<'a> {
             None => {
                 let (width, height) = self.size(picture);
                 // The first texture takes the pixels over; only further ones are copies.
-                let rgba = match self.holder[picture] {
-                    None => std::mem::take(&mut self.pictures.list[picture].rgba),
+                let bytes = match self.holder[picture] {
+                    None => std::mem::take(&mut self.pictures.list[picture].bytes),
                     Some(_) => {
                         self.afford(with_mips(width, height), w)?;
                         self.pixels(picture).to_vec()
                     }
                 };
-                let id = self.push((width, height), rgba, content, slot)?;
+                let id = self.push((width, height), bytes, content, slot)?;
                 self.holder[picture].get_or_insert(id);
                 self.plain.insert(key, id);
                 id
@@ -179,8 +179,8 @@ impl<'a> Textures<'a> {
                 let sizes = bake::sizes(own[0], own[1], alike);
                 self.afford(sizes.iter().map(|&(width, height)| with_mips(width, height)).sum(), w)?;
                 let grid = |k: usize| {
-                    let rgba = pictures[k].map_or(&[255; 4][..], |p| self.pixels(p));
-                    Grid { size: own[k], rgba, wrap: samplings[k].0, srgb: srgb[k] }
+                    let bytes = pictures[k].map_or(&[255; 4][..], |p| self.pixels(p));
+                    Grid { size: own[k], bytes, wrap: samplings[k].0, srgb: srgb[k] }
                 };
                 let [diffuse, specular] = bake::bake(&grid(0), &grid(1), alike, factor, workflow);
                 let diffuse = self.push(sizes[0], diffuse, content, slot_a)?;
@@ -216,7 +216,7 @@ impl<'a> Textures<'a> {
     fn pixels(&self, picture: usize) -> &[u8] {
         match self.holder[picture] {
             Some(id) => &self.made[id.0 as usize].levels()[0],
-            None => &self.pictures.list[picture].rgba,
+            None => &self.pictures.list[picture].bytes,
         }
     }
 
@@ -226,9 +226,9 @@ impl<'a> Textures<'a> {
         sampling(sampler)
     }
 
-    fn push(&mut self, size: Size, rgba: Vec<u8>, content: Content, slot: Slot) -> Option<TextureId> {
+    fn push(&mut self, size: Size, bytes: Vec<u8>, content: Content, slot: Slot) -> Option<TextureId> {
         let (wrap, filter) = self.sampling(slot);
-        let texture = Texture::new(size.0 as u32, size.1 as u32, rgba, content, wrap, filter).ok()?;
+        let texture = Texture::new(size.0 as u32, size.1 as u32, bytes, content, wrap, filter).ok()?;
         self.made.push(texture);
         Some(TextureId(self.made.len() as u32 - 1))
     }

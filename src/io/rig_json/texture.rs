@@ -68,9 +68,16 @@ pub(super) fn decode(file: &str, bytes: &[u8], left: &mut u64) -> Result<Option<
     let mut limits = image::Limits::default();
     (limits.max_image_width, limits.max_image_height) = (Some(16_384), Some(16_384));
     reader.limits(limits);
-    let picture = reader.decode().map_err(|e| error(e.to_string()))?.into_rgba8();
-    let (width, height) = picture.dimensions();
-    Texture::new(width, height, picture.into_raw(), Content::Color, [WrapMode::Repeat; 2], Filter::Trilinear)
-        .map(Some)
-        .map_err(|e| error(e.to_string()))
+    let picture = reader.decode().map_err(|e| error(e.to_string()))?;
+    let (width, height) = (picture.width(), picture.height());
+    Texture::new(
+        width,
+        height,
+        crate::io::codes(picture),
+        Content::Color,
+        [WrapMode::Repeat; 2],
+        Filter::Trilinear,
+    )
+    .map(Some)
+    .map_err(|e| error(e.to_string()))
 }
