@@ -82,6 +82,41 @@ fn threads_builds_and_old_buffers_do_not_show() {
 }
 
 #[test]
+fn what_moves_leaves_nothing_behind() {
+    let mut rng = Rng::new(11);
+    for (size, count) in [(0.9, 6), (0.35, 40), (0.1, 200)] {
+        let corners: Vec<Vec3> = (0..count)
+            .flat_map(|_| {
+                let center = rng.point(1.0);
+                [0; 3].map(|_| center + rng.point(size))
+            })
+            .collect();
+        let triangles = (0..count).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+        let camera = perspective(Vec3::Z * 3.0, Vec3::ZERO, 1.0);
+        let double_sided = Material { double_sided: true, ..material(Vec4::ONE) };
+        let stage = Stage::of(camera, mesh(corners.clone(), triangles), double_sided);
+        for (samples, isa) in [(1, Isa::Best), (4, Isa::Best), (4, Isa::Portable)] {
+            let mut used = Rasterizer::with_isa(isa);
+            for step in 0..40 {
+                let turn = glam::Quat::from_rotation_y(0.15 * step as f32);
+                let moved: Vec<Vec3> = corners.iter().map(|&p| turn * p).collect();
+                let mut scene = stage.scene();
+                scene.objects[0].positions = &moved;
+                let settings = Settings { width: 100, height: 70, samples, threads: 1 };
+                let (mut want, mut found) = (Rgba8::default(), Rgba8::default());
+                let stats = Rasterizer::with_isa(isa).draw(&scene, &settings, &mut want);
+                assert_eq!(
+                    used.draw(&scene, &settings, &mut found),
+                    stats,
+                    "{size} {samples} {isa:?} {step}"
+                );
+                assert!(want == found, "{size} {samples} {isa:?} {step}");
+            }
+        }
+    }
+}
+
+#[test]
 fn coordinates_of_any_kind_are_survived() {
     let mut rng = Rng::new(5);
     let strange = [

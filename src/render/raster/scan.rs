@@ -105,13 +105,12 @@ impl Entries {
         }
     }
 
-    /// List the pixels of a tile, `w` wide, that show a triangle among those where it won, and its parts of others; the number of whole
-    /// ones.
+    /// List the pixels of a tile that show a triangle among those where it won, and its parts of others; the number of whole ones.
     #[inline(always)]
     fn find<const SAMPLES: usize, const LANES: usize>(
         &mut self,
         ids: &[u32; 4 * TILE * TILE],
-        w: usize,
+        live: &[u64; TILE / 8],
         won: &Won,
     ) -> usize {
         let Won { id, places, .. } = *won;
@@ -121,7 +120,7 @@ impl Entries {
         if self.keys.len() < most {
             self.keys.resize(2 * most, 0);
         }
-        let (keys, mut n, cut) = (&mut self.keys[first as usize..most], 0, w < TILE);
+        let (keys, mut n) = (&mut self.keys[first as usize..most], 0);
         let shows = |at: usize| load(&ids[at..]).equal(I8::splat(id as i32)).bitmask();
         for &at in places {
             let at = (at as usize).min(SAMPLES * TILE * TILE - LANES);
@@ -134,10 +133,8 @@ impl Entries {
                 mask = ((whole & 0x1111) * 0x1248) >> 12 & 0xf;
             }
             let place = at / SAMPLES;
-            if cut && place % TILE + 8 > w {
-                // What lies side by side may reach beyond the picture.
-                mask &= (1 << (w - place % TILE)) - 1;
-            }
+            // What lies side by side may reach beyond the picture, and into a block that holds what was seen in another one.
+            mask &= (live[place / (8 * TILE)] >> (place % TILE)) as u32;
             // What is written beyond those that are there is overwritten by the next.
             let run = I8::splat(key(place, WHOLE)) + bits(mask);
             keys[n..n + 8].copy_from_slice(&run.0);
@@ -204,10 +201,11 @@ fn list<const SAMPLES: usize>(bins: &[Bins], tile: usize, area: Area, scratch: &
     let TileScratch { entries, seen, stats, .. } = scratch;
     entries.parts.sort_unstable();
     let ids: &mut [u32; 4 * TILE * TILE] = (&mut seen.id[..4 * TILE * TILE]).try_into().expect("a tile");
+    let live = live(seen.touched, area.w);
     for won in seen.places.iter() {
         let whole = match won.lanes {
-            16 => entries.find::<SAMPLES, 16>(ids, area.w, &won),
-            _ => entries.find::<SAMPLES, 8>(ids, area.w, &won),
+            16 => entries.find::<SAMPLES, 16>(ids, &live, &won),
+            _ => entries.find::<SAMPLES, 8>(ids, &live, &won),
         };
         stats.samples += (SAMPLES * whole) as u64;
     }
@@ -227,6 +225,15 @@ fn list<const SAMPLES: usize>(bins: &[Bins], tile: usize, area: Area, scratch: &
             stats.samples += SAMPLES as u64;
         }
     }
+}
+
+/// For each row of blocks, which columns of a tile `w` wide lie in blocks that are in use: a bit each.
+fn live(touched: u64, w: usize) -> [u64; TILE / 8] {
+    let columns = u64::MAX >> (TILE - w.clamp(1, TILE));
+    std::array::from_fn(|row| {
+        let blocks = touched >> (8 * row);
+        (0..8).filter(|b| blocks >> b & 1 != 0).fold(0, |all, b| all | 0xff << (8 * b)) & columns
+    })
 }
 
 /// The numbers of the bits that are set among the lowest eight, side by side.
