@@ -74,6 +74,22 @@ fn strays(points: &[Vec3], places: &[DVec3]) -> f64 {
 }
 
 #[test]
+fn a_rig_that_stands_still_keeps_its_picture() {
+    let dir = tempfile::tempdir().unwrap();
+    let read = |file: &str| io::import(Path::new(file), &Options { textures: true }).unwrap().asset;
+    let rig = read("rigs/koi.json");
+    for form in [&["--pose-at", "0.5"][..], &["--vertices", "--clip", "swim"]] {
+        let out = path(&dir, "koi.glb");
+        let run = sinew(&[&["bake", "rigs/koi.json", "-o", &out, "-f", "-q"], form].concat());
+        assert!(run.status.success(), "{form:?}: {}", text(&run.stderr));
+        let still = read(&out);
+        assert_eq!((still.textures.len(), rig.textures.len()), (1, 1));
+        assert!(still.textures[0].rgba() == rig.textures[0].rgba());
+        assert!(still.materials.iter().any(|m| m.diffuse_map.is_some()));
+    }
+}
+
+#[test]
 fn pose_at_writes_the_character_as_it_stands_then() {
     let source = import(&folder().1);
     let truth = places(&source, 0, 0.4);

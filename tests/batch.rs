@@ -89,6 +89,22 @@ fn shares_are_the_whole() {
 }
 
 #[test]
+fn shares_of_pixel_art_have_the_colors_of_the_whole() {
+    let (dir, input) = folder();
+    let make = |out: &str, more: &[&str]| {
+        let out = path(&dir, out);
+        let all =
+            ["render", &input, "-o", &out, "--size", "32", "--fps", "8", "--pixel-art", "--colors", "5"];
+        succeeds(&[&all[..], more].concat());
+    };
+    make("a/f.##.png", &[]);
+    let whole = contents(&dir.path().join("a"));
+    make("b/f.##.png", &["--shard", "2/2"]);
+    make("b/f.##.png", &["--skip-existing"]);
+    assert!(contents(&dir.path().join("b")) == whole);
+}
+
+#[test]
 fn a_manifest_lists_every_frame_whether_it_was_drawn_or_there() {
     let (dir, input) = folder();
     let (out, list) = (path(&dir, "f.##.png"), path(&dir, "list.json"));

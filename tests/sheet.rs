@@ -157,6 +157,24 @@ const SIDES: [&str; 12] = [
     "1",
 ];
 
+#[test]
+fn pivots_of_a_crop_count_from_its_corner() {
+    let dir = tempfile::tempdir().unwrap();
+    let input = rig_path("pip.json");
+    let pivot = |name: &str, more: &[&str]| {
+        let out = path(&dir, &format!("{name}.png"));
+        let fixed =
+            ["render", &input, "-o", &out, "--sheet", "grid", "--size", "64", "--fps", "2", "--clip", "walk"];
+        does(&[&fixed[..], more].concat());
+        let json = json(&path(&dir, &format!("{name}.json")));
+        let first = json["frames"].as_object().unwrap().values().next().unwrap()["pivot"].clone();
+        ["x", "y"].map(|axis| first[axis].as_f64().unwrap())
+    };
+    let ([x, y], part) = (pivot("whole", &[]), pivot("part", &["--crop", "10,12,40,30"]));
+    let want = [(x * 64.0 - 10.0) / 40.0, (y * 64.0 - 12.0) / 30.0];
+    assert!((0..2).all(|i| (part[i] - want[i]).abs() < 1e-5), "{part:?} {want:?}");
+}
+
 /// A frame as it was, put together again from the sheet.
 fn restored(sheet: &RgbaImage, frame: &Value) -> Rgba8 {
     let (place, trim) = (rect(&frame["frame"]), rect(&frame["spriteSourceSize"]));

@@ -49,8 +49,8 @@ impl ShotDesc {
 }
 
 impl Shot<'_> {
-    /// Where a point of the world is in the picture of a moment: fractions of its width and height from the top left, possibly
-    /// outside. `None` behind the eye.
+    /// Where a point of the world is in the picture of a moment, as it is cropped: fractions of its width and height from the top left,
+    /// possibly outside. `None` behind the eye.
     pub fn project(&self, moment: impl Into<Moment>, point: DVec3, worker: &mut Worker) -> Option<[f64; 2]> {
         let mut camera: Option<Camera> = None;
         self.with_scene(moment.into(), worker, |scene, _| {
@@ -60,7 +60,13 @@ impl Shot<'_> {
         let settings = &self.desc.settings;
         let aspect = settings.width as f32 / settings.height.max(1) as f32;
         let p = camera?.clip_from_scene(aspect).as_dmat4() * (point - self.center).extend(1.0);
-        (p.w > 0.0).then(|| [0.5 + 0.5 * p.x / p.w, 0.5 - 0.5 * p.y / p.w])
+        let part = self.part(self.desc.crop);
+        let within = |whole: usize, first: usize, n: usize, x: f64| {
+            (x * whole as f64 - first as f64) / n.max(1) as f64
+        };
+        let [x, y] = [0.5 + 0.5 * p.x / p.w, 0.5 - 0.5 * p.y / p.w];
+        let across = within(settings.width, part.x, part.width, x);
+        (p.w > 0.0).then(|| [across, within(settings.height, part.y, part.height, y)])
     }
 
     /// Whether the clip's end looks like its start, so that it may be shown again and again.

@@ -3,7 +3,7 @@
 use super::clips::Edited;
 use super::report::{self, Done};
 use super::write::{self, put_bytes};
-use super::{Args, failure, mesh, threads};
+use super::{Args, failure, fresh, mesh, threads};
 use crate::cli::{Failure, say, say::Say};
 use serde_json::{Map, Value, json};
 use sinew::asset::Asset;
@@ -282,11 +282,14 @@ fn frozen(
         .iter()
         .map(|clip| gltf::NewClip { clip, short: &[], replaces: None, carried: None })
         .collect();
-    let asset =
-        Asset { character: character.clone(), materials: import.asset.materials.clone(), ..Asset::default() };
+    let Asset { materials, textures, .. } = import.asset.clone();
+    let asset = Asset { character: character.clone(), materials, textures, ..Asset::default() };
     let extras = Map::from_iter([("sinew".to_owned(), told.clone())]);
-    let (mut out, _) = gltf::write(&asset, &[], &clips, extras).map_err(|e| bad(&e))?;
-    if import.format == "glTF" {
+    // A glTF file's own look takes the place of this one.
+    let own = import.format == "glTF";
+    let pictures = if own { vec![] } else { fresh::pictures(&asset)? };
+    let (mut out, _) = gltf::write(&asset, &pictures, &clips, extras).map_err(|e| bad(&e))?;
+    if own {
         let bytes = io::read_file(input).map_err(|e| bad(&e))?;
         let folder = input.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         gltf::wear(&mut out, &bytes, Some(folder)).map_err(|e| bad(&e))?;

@@ -3,6 +3,7 @@
 use super::report::Done;
 use crate::cli::{Failure, say::Say};
 use serde_json::{Map, Value};
+use sinew::asset::Asset;
 use sinew::clip::Clip;
 use sinew::image::Rgba8;
 use sinew::io::picture::{PngLevel, encode_png};
@@ -18,7 +19,7 @@ pub(super) fn gltf(
     extras: Map<String, Value>,
     say: &Say,
 ) -> Result<gltf::Rewritten, Failure> {
-    let pictures = import.asset.textures.iter().map(png).collect::<Result<Vec<_>, _>>()?;
+    let pictures = pictures(&import.asset)?;
     let new: Vec<gltf::NewClip> = done
         .iter()
         .map(|d| gltf::NewClip { clip: &d.baked.clip, short: &d.baked.short, replaces: None, carried: None })
@@ -27,6 +28,11 @@ pub(super) fn gltf(
     let (out, warnings) = gltf::write(&import.asset, &pictures, &new, extras).map_err(bad)?;
     say.warnings(input, &warnings);
     Ok(out)
+}
+
+/// An asset's textures as PNG.
+pub(super) fn pictures(asset: &Asset) -> Result<Vec<Vec<u8>>, Failure> {
+    asset.textures.iter().map(png).collect()
 }
 
 fn png(texture: &Texture) -> Result<Vec<u8>, Failure> {

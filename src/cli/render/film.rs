@@ -26,6 +26,8 @@ const PALETTE_FRAMES: usize = 16;
 pub struct Job<'a> {
     pub shot: &'a Shot<'a>,
     pub frames: &'a [Frame],
+    /// Those and the ones that are another share's or there already: what all have in common follows from them.
+    pub whole: &'a [Frame],
     pub rate: Rate,
     pub transparent: bool,
     pub target: &'a Target,

@@ -130,6 +130,8 @@ fn usual_size(import: &Import) -> Option<[usize; 2]> {
 /// Which pictures an output consists of.
 struct Plan {
     frames: Vec<Frame>,
+    /// Those and the ones that are another share's or there already.
+    whole: Vec<Frame>,
     size: [usize; 2],
 }
 
@@ -147,7 +149,11 @@ fn plan(args: &Args, task: &Task) -> Result<Plan, Failure> {
     }
     let settings = args.output.settings(usual_size(task.import), args.renderer.coverage())?;
     let whole = [settings.width, settings.height];
-    Ok(Plan { frames, size: args.camera.crop(whole)?.map_or(whole, |c| [c.width, c.height]) })
+    Ok(Plan {
+        whole: frames.clone(),
+        frames,
+        size: args.camera.crop(whole)?.map_or(whole, |c| [c.width, c.height]),
+    })
 }
 
 /// Draw the frames of a plan and write them.
@@ -235,6 +241,7 @@ fn draw(args: &Args, task: &Task, plan: &Plan, totals: &mut Totals, say: &Say) -
     let mut job = Job {
         shot: &shot,
         frames: moments.as_ref().unwrap_or(&plan.frames),
+        whole: moments.as_ref().unwrap_or(&plan.whole),
         rate: args.time.fps,
         transparent,
         target: task.target,

@@ -140,8 +140,14 @@ pub(super) fn load(
     let mut list = Vec::with_capacity(jobs.len());
     for (i, (decoded, job)) in images.into_iter().zip(decode_all(&jobs, begun).into_iter().zip(&jobs)) {
         let refused = || Err(job.as_ref().err().cloned().unwrap_or_default());
+        let place = format!("images[{i}]");
+        if job.as_ref().is_ok_and(|bytes| is_cut_short(bytes)) {
+            w.push(place.clone(), "the JPEG ends early; what is missing is grey or black");
+        }
         list.push(decoded.unwrap_or_else(refused).unwrap_or_else(|why| {
-            w.push(format!("images[{i}]"), format!("{why}; plain white is used"));
+            // Who says why may have said where.
+            let why = why.strip_prefix(&format!("{place}: ")).unwrap_or(&why).trim_end();
+            w.push(place, format!("{why}; plain white is used"));
             Picture::white()
         }));
     }
@@ -273,10 +279,15 @@ fn decode_jpeg(bytes: &[u8]) -> Option<Picture> {
     if decoder.input_colorspace()? != ColorSpace::YCbCr {
         return None;
     }
-    // Rows that a file cut short does not hold stay black, as without this short way.
     let mut bytes = vec![0; 3 * width * height];
     decoder.decode_into(&mut bytes).ok()?;
     Some(Picture { width, height, bytes })
+}
+
+/// Whether a JPEG's last scan has no end: within one neither marker can stand.
+fn is_cut_short(bytes: &[u8]) -> bool {
+    let mut markers = bytes.windows(2).rev().filter(|w| w[0] == 0xff && matches!(w[1], 0xd9 | 0xda));
+    bytes.starts_with(b"\xff\xd8") && markers.next().is_some_and(|last| last[1] == 0xda)
 }
 
 #[cfg(feature = "pictures")]
@@ -357,6 +368,12 @@ mod tests {
             let (early, late) = (import(&glb), import(&embedded));
             assert!(!late.asset.textures.is_empty() && early.asset.textures == late.asset.textures);
             assert_eq!(early.warnings, late.warnings);
+            let said = early.warnings.iter().map(|w| w.to_string()).collect::<String>();
+            assert_eq!(
+                said.contains("images[0]: the JPEG ends early"),
+                picture.len() < whole.len() && picture[0] == 0xff,
+                "{said}"
+            );
         }
     }
 

@@ -8,10 +8,11 @@ use crate::asset::Asset;
 use crate::character::{Binding, Character, Instance};
 use crate::clip::{self, Curve, Target};
 use crate::fk::Posed;
+use crate::image::color::LINEAR_OF_SRGB8;
 use crate::io::Warning;
 use crate::math::spline;
 use crate::mesh::MorphTarget;
-use crate::scene::Material;
+use crate::scene::{Filter, Material, Texture, TextureRef, WrapMode};
 use crate::skeleton::{BoneId, Skeleton};
 use glam::{Affine3A, Quat, Vec3};
 
@@ -43,7 +44,7 @@ pub fn export(name: &str, asset: &Asset, textures: &[String]) -> Exported<Rig> {
     });
     let meshes = meshes.collect();
     let documents = asset.materials.iter().zip(&materials);
-    let materials = documents.map(|(m, name)| material(m, name, textures, &mut warnings)).collect();
+    let materials = documents.map(|(m, name)| material(m, name, asset, textures, &mut warnings)).collect();
     for (n, what) in [(asset.cameras.len(), "cameras"), (asset.lights.len(), "lights")] {
         if n > 0 {
             warn(&mut warnings, what, format!("{n} left out: a rig has none"));
@@ -184,17 +185,20 @@ fn bind(binding: &Binding, names: &[String], posed: &Posed) -> Bind {
 fn material(
     m: &Material,
     name: &str,
+    asset: &Asset,
     textures: &[String],
     warnings: &mut Vec<Warning>,
 ) -> document::Material {
     let base = Material::default();
     let rgb = |c: Vec3, usual: Vec3| (c != usual).then(|| Color(c.extend(1.0)));
     let map = m.diffuse_map.and_then(|t| textures.get(t.texture.0 as usize).cloned());
+    let texture = |t: &TextureRef| asset.textures.get(t.texture.0 as usize);
+    let (specular, shininess) = highlight(m, m.specular_map.as_ref().and_then(texture));
     let document = document::Material {
         name: name.into(),
         diffuse: (m.diffuse != base.diffuse).then_some(Color(m.diffuse)),
-        specular: rgb(m.specular, base.specular),
-        shininess: (m.shininess != base.shininess).then_some(m.shininess),
+        specular: rgb(specular, base.specular),
+        shininess: (shininess != base.shininess).then_some(shininess),
         emissive: rgb(m.emissive, base.emissive),
         texture: map,
         double_sided: m.double_sided,
@@ -202,6 +206,12 @@ fn material(
     };
     let maps = [m.specular_map, m.emissive_map, m.normal_map, m.occlusion_map];
     let odd_map = m.diffuse_map.is_some_and(|t| t.uv_set != 0 || t.transform != glam::Affine2::IDENTITY);
+    let sampled = |t: &Texture| (t.wrap(), t.filter());
+    let usual = ([WrapMode::Repeat; 2], Filter::Trilinear);
+    if m.diffuse_map.as_ref().and_then(texture).is_some_and(|t| sampled(t) != usual) {
+        let what = "its texture's sampler left out: a rig's textures repeat and are filtered linearly";
+        warn(warnings, format!("material `{name}`"), what);
+    }
     if maps.iter().any(Option::is_some) || odd_map || (m.diffuse_map.is_some() && document.texture.is_none())
     {
         warn(warnings, format!("material `{name}`"), "maps left out: a rig has one plain diffuse texture");
@@ -215,6 +225,15 @@ fn material(
         );
     }
     document
+}
+
+/// `k_s` and `p` without their map: with its mean.
+fn highlight(m: &Material, map: Option<&Texture>) -> (Vec3, f32) {
+    let Some(map) = map else { return (m.specular, m.shininess) };
+    let coarsest = map.levels().last().map_or(&[][..], Vec::as_slice);
+    let code = |c: usize| coarsest.get(c).copied().unwrap_or(255);
+    let light = Vec3::from_array([0, 1, 2].map(|c| LINEAR_OF_SRGB8[usize::from(code(c))]));
+    (m.specular * light, m.shininess.powf(f32::from(code(3)) / 255.0))
 }
 
 fn one_clip(c: &clip::Clip, names: &[String], runs: &[(usize, usize)], warnings: &mut Vec<Warning>) -> Clip {

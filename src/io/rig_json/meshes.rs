@@ -9,10 +9,10 @@ use crate::io::MAX_CLOSEST;
 use crate::io::Warning;
 use crate::mesh::normals::{self, Weighting};
 use crate::mesh::{MaterialId, Mesh, MeshData, MorphTarget};
-use crate::scene::{AlphaMode, Material, TextureId, TextureRef};
+use crate::scene::{AlphaMode, Material};
 use crate::skeleton::{BoneId, Skeleton};
 use crate::skin::{Weights, bind_closest};
-use glam::{Affine2, Affine3A, Vec2, Vec3};
+use glam::{Affine3A, Vec2, Vec3};
 use std::collections::BTreeMap;
 
 /// What meshes are bound to: the skeleton, and its bones at rest.
@@ -302,8 +302,8 @@ pub fn bone_from_rest(posed: &Posed, bone: BoneId) -> Affine3A {
     if out.is_finite() && widen(&out).is_finite() { out } else { Affine3A::IDENTITY }
 }
 
-/// One material; `texture` is the place of its picture, if it was read.
-pub fn material(doc: &document::Material, texture: Option<TextureId>) -> Result<Material, RigError> {
+/// One material, without its picture.
+pub fn material(doc: &document::Material) -> Result<Material, RigError> {
     let base = Material::default();
     let place = || format!("material `{}`", doc.name);
     let colors = [&doc.diffuse, &doc.specular, &doc.emissive];
@@ -316,11 +316,9 @@ pub fn material(doc: &document::Material, texture: Option<TextureId>) -> Result<
         return Err(RigError::value(place(), why));
     }
     let diffuse = doc.diffuse.map_or(base.diffuse, |c| c.0);
-    let on = |texture| TextureRef { texture, uv_set: 0, transform: Affine2::IDENTITY };
     Ok(Material {
         name: doc.name.clone(),
         diffuse,
-        diffuse_map: texture.map(on),
         specular: doc.specular.map_or(base.specular, |c| c.0.truncate()),
         shininess,
         emissive: doc.emissive.map_or(base.emissive, |c| c.0.truncate()),

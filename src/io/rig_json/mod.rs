@@ -25,7 +25,9 @@ use crate::clip;
 use crate::fk;
 use crate::io::{Import, Options, read_below, read_file};
 use crate::pose::Pose;
+use crate::scene::{AlphaMode, Content, TextureRef};
 use crate::time::Timeline;
+use glam::Affine2;
 use std::path::Path;
 
 /// Fetches a file that a rig names, by its path relative to the rig, without `.` and needless `..`.
@@ -132,8 +134,15 @@ impl Rig {
         let mut textures = texture::Textures::new(options.textures, fetch);
         let mut materials = Vec::with_capacity(self.materials.len());
         for m in &self.materials {
-            let map = m.texture.as_ref().map(|file| textures.load(file, &mut warnings)).transpose()?;
-            materials.push(meshes::material(m, map.flatten())?);
+            let mut material = meshes::material(m)?;
+            // On an opaque surface alpha means nothing, so it must not weigh colours.
+            let content =
+                if material.alpha == AlphaMode::Opaque { Content::ColorAndNumber } else { Content::Color };
+            let map =
+                m.texture.as_ref().map(|file| textures.load(file, content, &mut warnings)).transpose()?;
+            let on = |texture| TextureRef { texture, uv_set: 0, transform: Affine2::IDENTITY };
+            material.diffuse_map = map.flatten().map(on);
+            materials.push(material);
         }
 
         // Meshes, each drawn once.

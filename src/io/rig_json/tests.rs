@@ -267,6 +267,52 @@ fn a_picture_under_several_spellings_is_decoded_once() {
 
 #[cfg(feature = "pictures")]
 #[test]
+fn alpha_weighs_no_colors_where_it_means_nothing() {
+    let mut png = std::io::Cursor::new(Vec::new());
+    let texels = vec![255, 0, 0, 255, 0, 255, 0, 0];
+    let picture = image::RgbaImage::from_raw(2, 1, texels).unwrap();
+    picture.write_to(&mut png, image::ImageFormat::Png).unwrap();
+    let rig = r##"{"sinew_rig": 1, "bones": [{"name": "a", "head": [0,0,0], "tail": [1,0,0]}], "meshes": [], "materials": [
+        {"name": "solid", "texture": "a.png"}, {"name": "glass", "texture": "a.png", "diffuse": "#ffffff80"}]}"##;
+    let fetch = |_: &str| Ok(png.get_ref().clone());
+    let import = import_bytes(rig.as_bytes(), &Options { textures: true }, &fetch).unwrap();
+    // The mean of red and green in linear light; and red alone, where green is not seen.
+    let coarse = import.asset.textures.iter().map(|t| t.levels()[1].clone()).collect::<Vec<_>>();
+    assert_eq!(coarse, [[188, 188, 0, 128], [255, 0, 0, 128]]);
+    let of = |i: usize| import.asset.materials[i].diffuse_map.unwrap().texture.0;
+    assert_eq!([0, 1].map(of), [0, 1]);
+}
+
+#[test]
+fn highlights_whose_map_is_left_out_are_its_mean() {
+    use crate::scene::{Filter, Material, Texture, TextureId, WrapMode};
+    let map = |codes: [u8; 8]| {
+        let (content, wrap) = (Content::ColorAndNumber, [WrapMode::Clamp; 2]);
+        Texture::new(2, 1, codes.to_vec(), content, wrap, Filter::Trilinear).unwrap()
+    };
+    let textures = vec![map([188, 0, 0, 128, 188, 0, 0, 128])];
+    let on = TextureRef { texture: TextureId(0), uv_set: 0, transform: Affine2::IDENTITY };
+    let matt = Material {
+        specular: glam::Vec3::ONE,
+        shininess: 1024.0,
+        specular_map: Some(on),
+        ..Material::default()
+    };
+    let skin = Material { name: "skin".into(), diffuse_map: Some(on), ..Material::default() };
+    let asset = Asset { materials: vec![matt, skin], textures, ..Asset::default() };
+    let out = export("x", &asset, &["x.png".into()]);
+    let [matt, skin] = &out.document.materials[..] else { panic!("two materials") };
+    let specular = matt.specular.unwrap().0;
+    assert!((specular.x - 0.5).abs() < 0.01 && specular.y == 0.0, "{specular}");
+    // 1024 to the power of 128/255.
+    assert!((matt.shininess.unwrap() - 32.4).abs() < 0.1, "{:?}", matt.shininess);
+    assert_eq!((skin.specular, skin.shininess), (None, None));
+    let said = out.warnings.iter().map(|w| w.to_string()).collect::<Vec<_>>().join("; ");
+    assert!(said.contains("material `skin`: its texture's sampler left out"), "{said}");
+}
+
+#[cfg(feature = "pictures")]
+#[test]
 fn pictures_beyond_the_bound_are_refused_before_they_are_decoded() {
     // 8193² × 4 bytes are just too many; only the header is there.
     let mut png = white_png(1);
@@ -282,8 +328,8 @@ fn pictures_beyond_the_bound_are_refused_before_they_are_decoded() {
     // Small ones count together.
     let mut left = 4 * 2 * 2 + 1;
     let small = white_png(2);
-    assert!(texture::decode("a", &small, &mut left).is_ok());
-    assert!(texture::decode("b", &small, &mut left).is_err());
+    assert!(texture::decode("a", &small, Content::Color, &mut left).is_ok());
+    assert!(texture::decode("b", &small, Content::Color, &mut left).is_err());
 }
 
 #[cfg(unix)]

@@ -119,9 +119,9 @@ impl PixelArgs {
         let palette = self.palette.as_deref().map(read).transpose()?;
         let mut samples = Vec::new();
         if palette.is_none() {
-            let n = job.frames.len();
+            let n = job.whole.len();
             let few = n.min(PALETTE_FRAMES);
-            let spread: Vec<Frame> = (0..few).map(|k| job.frames[k * n / few]).collect();
+            let spread: Vec<Frame> = (0..few).map(|k| job.whole[k * n / few]).collect();
             let one = |w: &mut Worker, f: &Frame| {
                 let mut out = Rgba8::default();
                 job.shot.draw(f.moment, w, &mut out);

@@ -17,7 +17,9 @@ pub(super) fn write(out: &mut Rewritten, asset: &Asset, pictures: &[Vec<u8>], wa
     let mut used = Extensions::default();
     let mut place = vec![0; asset.textures.len()];
     let referred = asset.materials.iter().flat_map(maps).map(|m| m.texture.0).collect::<BTreeSet<u32>>();
-    referred.iter().enumerate().for_each(|(i, t)| place[*t as usize] = i);
+    for (i, &t) in referred.iter().enumerate().filter(|_| has_pictures) {
+        place[t as usize] = i;
+    }
     let places = has_pictures.then_some(&place[..]);
     for m in &asset.materials {
         let json = material(m, places, &mut used, warnings);
