@@ -249,5 +249,23 @@ fn a_dry_run_says_what_would_be_written_and_writes_nothing() {
     let before = files(dir.path());
     let said = succeeds(&["render", &input, "-o", &out, "--dry-run", "--shard", "2/3"]);
     assert!(said.contains("f.##.png: 8 of 8 frames of 512x512, wave of"), "{said}");
+    let sheet = path(&dir, "s.png");
+    let said =
+        succeeds(&["render", &input, "-o", &sheet, "--dry-run", "--sheet", "grid", "--directions", "4"]);
+    assert!(
+        said.contains("s.png: 96 of 96 frames") && said.contains("with ") && said.contains("s.json"),
+        "{said}"
+    );
+    let said = succeeds(&["render", &input, "-o", &sheet, "--dry-run", "--contact", "4x2"]);
+    assert!(said.contains("s.png: 8 of 8 frames"), "{said}");
     assert_eq!(files(dir.path()), before);
+
+    // What would fail does.
+    let says = |out: &str, more: &[&str], part: &str| {
+        let (code, message) = fails(&[&["render", &input, "-o", out, "--dry-run"], more].concat());
+        assert!(code == 1 && message.contains(part), "{message}");
+    };
+    says(&path(&dir, "none/s.png"), &[], "none does not exist; create it first");
+    std::fs::write(path(&dir, "s.json"), "kept").unwrap();
+    says(&sheet, &["--sheet", "grid"], "s.json: the file exists; --force overwrites it");
 }

@@ -193,6 +193,17 @@ fn nodes_must_be_a_tree() {
     assert!(file.error().starts_with("nodes[1].children[0]: "), "{}", file.error());
     file.json["nodes"] = json!([{ "children": [9] }]);
     assert_eq!(file.error(), "nodes[0].children[0]: node 9 does not exist; there are 1");
+
+    // Not taken for what 32 bits of it say.
+    let cases = [
+        ("/nodes/0/mesh", "nodes[0].mesh"),
+        ("/meshes/0/primitives/0/attributes/POSITION", "meshes[0].primitives[0].attributes.POSITION"),
+    ];
+    for (pointer, place) in cases {
+        let mut file = File::new();
+        *file.json.pointer_mut(pointer).unwrap() = json!(1u64 << 32);
+        assert_eq!(file.error(), format!("{place}: expected an index below 2³², found 4294967296"));
+    }
 }
 
 fn skinned() -> File {

@@ -470,6 +470,7 @@ fn what_cannot_be_meant_is_refused_before_anything_is_written() {
         (vec!["-o", &out, "--contact", "2x2", "--sheet", "grid"], 2, "cannot be used with"),
         (vec!["-o", &out, "--pixel-art", "--size", "64", "--pixel-scale", "5"], 2, "65x65"),
         (vec!["-o", &out, "--colors", "8"], 2, "--pixel-art"),
+        (vec!["-o", &out, "--sheet", "grid", "--power-of-two"], 2, "--sheet trimmed"),
         (vec!["-o", &out, "--sheet", "grid", "--size", "4096", "--columns", "9"], 1, "36864 ×"),
         (vec!["-o", &path(&dir, "flag.png"), "--sheet", "grid", "--force"], 2, "this is an input"),
     ] {

@@ -62,6 +62,9 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     let tolerance =
         Tolerance { psnr: args.psnr_min, ssim: args.ssim_min, codes: args.max_diff, pixels: args.max_pixels };
 
+    let ends = |p: &PathBuf| p.as_os_str().to_string_lossy().ends_with('/');
+    let in_folder = folder || args.diff.as_ref().is_some_and(ends);
+
     // Pairs are compared in parallel and reported in order.
     let processors = std::thread::available_parallelism().map_or(1, |n| n.get());
     let threads = if args.threads == 0 { processors } else { args.threads.min(256) };
@@ -70,7 +73,7 @@ pub fn run(args: &Args, say: &Say) -> Result<(), Failure> {
     let job = |_: &mut (), i: usize| {
         let mut outcome = pair::compare(&pairs[i], &tolerance, places[i].is_some());
         if let Some(panels) = outcome.panels.take() {
-            outcome.drawn = places[i].as_ref().map(|place| draw(place, &panels, folder));
+            outcome.drawn = places[i].as_ref().map(|place| draw(place, &panels, in_folder));
         }
         outcome
     };

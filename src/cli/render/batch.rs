@@ -215,7 +215,11 @@ impl<'a> Batch<'a> {
         let there = |f: &Frame| skip && target.path_of(f.number).is_some_and(|p| p.exists()) && complete(f);
         plan.frames.retain(|f| !there(f));
         if self.args.batch.dry_run {
-            return announce(&task, &plan, all.len(), &companions);
+            let mut files = companions;
+            files.extend(plan.frames.iter().flat_map(|f| self.args.channels.files(&target, f.number)));
+            let pictures = plan.frames.iter().filter_map(|f| target.path_of(f.number));
+            self.refuse_what_cannot_be(pictures.chain(files.iter().cloned()), &target)?;
+            return announce(self.args, &task, &plan, all.len(), &files);
         }
         if self.names.template.tells_inputs() || self.names.template.tells_clips() {
             target.path_of(1).map_or(Ok(()), |p| batch::make_folder(&p))?;
@@ -238,6 +242,29 @@ impl<'a> Batch<'a> {
         self.outcome.done += 1;
         match self.args.batch.manifest {
             Some(_) => self.record(&task, clip_name, &all, &plan, done),
+            None => Ok(()),
+        }
+    }
+
+    /// What a dry run would find out only when it is none: files that are in the way, and a folder that is not there.
+    fn refuse_what_cannot_be(
+        &self,
+        mut files: impl Iterator<Item = PathBuf>,
+        target: &Target,
+    ) -> Result<(), Failure> {
+        let made = matches!(target, Target::Sequence(..))
+            || self.names.template.tells_inputs()
+            || self.names.template.tells_clips();
+        let folder = target.path_of(1).and_then(|p| p.parent().map(Path::to_owned));
+        if let Some(folder) = folder.filter(|f| !made && !f.as_os_str().is_empty() && !f.is_dir()) {
+            let (name, folder) = (target.name(), folder.display());
+            let message =
+                format!("{}: the folder {folder} does not exist; create it first (mkdir -p)", name.display());
+            return Err(Failure::Run(message));
+        }
+        let keep = !self.args.output.force && !self.args.batch.skip_existing;
+        match files.find(|p| keep && p.exists()) {
+            Some(p) => Err(Failure::Run(format!("{}: the file exists; --force overwrites it", p.display()))),
             None => Ok(()),
         }
     }
@@ -374,17 +401,22 @@ fn check_manifest(args: &Args, path: &Path) -> Result<(), Failure> {
 }
 
 /// Say what would be written.
-fn announce(task: &Task, plan: &Plan, all: usize, beside: &[PathBuf]) -> Result<(), Failure> {
+fn announce(args: &Args, task: &Task, plan: &Plan, all: usize, beside: &[PathBuf]) -> Result<(), Failure> {
     let [w, h] = plan.size;
     let clip = task.clip.map_or("rest", |c| task.import.asset.character.clips()[c].name.as_str());
-    let n = plan.frames.len();
+    let [n, all] = [plan.frames.len(), all].map(|n| args.sheet.pictures(n));
     let mut line = format!(
         "{}: {n} of {all} frames of {w}x{h}, {} of {}",
         task.target.name().display(),
         say::name(clip),
         task.input.display()
     );
-    beside.iter().for_each(|p| line += &format!(", with {}", p.display()));
+    match beside {
+        [first, .., last] if beside.len() > 8 => {
+            line += &format!(", with {} files, {} … {}", beside.len(), first.display(), last.display());
+        }
+        _ => beside.iter().for_each(|p| line += &format!(", with {}", p.display())),
+    }
     line.push('\n');
     print(line.as_bytes())
 }

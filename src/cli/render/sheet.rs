@@ -85,6 +85,15 @@ impl SheetArgs {
         self.sheet.is_some() || self.contact.is_some()
     }
 
+    /// Of how many pictures of the shot the output consists, if a film would have `frames`.
+    pub fn pictures(&self, frames: usize) -> usize {
+        match (self.sheet, self.contact) {
+            (_, Some([columns, rows])) => columns * rows,
+            (Some(_), None) => frames * usize::from(self.directions),
+            (None, None) => frames,
+        }
+    }
+
     /// The camera; directions start in front of the character unless somebody `placed` it elsewhere.
     pub fn view(&self, view: View, nobody_placed: bool) -> View {
         match view {
@@ -114,6 +123,10 @@ impl SheetArgs {
         if self.directions > 1 && self.sheet.is_none() {
             let message =
                 "--directions is for sprite sheets: expected --sheet grid or --sheet trimmed with it";
+            return Err(Failure::Usage(message.into()));
+        }
+        if self.power_of_two && self.sheet == Some(Kind::Grid) {
+            let message = "--power-of-two is for trimmed sheets: expected --sheet trimmed with it";
             return Err(Failure::Usage(message.into()));
         }
         self.pixels.settings(settings)

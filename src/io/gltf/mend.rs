@@ -1,6 +1,6 @@
 //! From JSON text to the typed schema. What the schema crate refuses although files have it is mended first.
 
-use super::error::{GltfError, Result};
+use super::error::{self, GltfError, Result};
 use super::warnings::Warnings;
 use ::gltf::json::{self, Root};
 use serde::Deserialize;
@@ -23,10 +23,57 @@ fn mended(text: &[u8], warnings: &mut Warnings) -> Result<Value> {
     let mut value: Value = serde_json::from_slice(trim_padding(text)).map_err(syntax)?;
     version(&mut value, warnings)?;
     strip_extras(&mut value);
+    if let Some((place, found)) = wide_index(&value, "") {
+        return Err(error::value(place.trim_start_matches('.'), "an index below 2³²", found));
+    }
     optional_lists(&mut value);
     texture_sources(&mut value);
     channels_without_node(&mut value, warnings);
     Ok(value)
+}
+
+/// An index that the schema crate would cut to 32 bits, and so take for another: its place and what it is.
+fn wide_index(value: &Value, key: &str) -> Option<(String, String)> {
+    const INDICES: [&str; 20] = [
+        "attributes",
+        "buffer",
+        "bufferView",
+        "camera",
+        "children",
+        "index",
+        "indices",
+        "input",
+        "inverseBindMatrices",
+        "joints",
+        "material",
+        "mesh",
+        "node",
+        "nodes",
+        "output",
+        "sampler",
+        "scene",
+        "skeleton",
+        "skin",
+        "source",
+    ];
+    let found = |(step, (rest, found)): (String, (String, String))| (step + &rest, found);
+    match value {
+        Value::Number(n) => {
+            let wide = n.as_u64().is_some_and(|n| n > u32::MAX.into()) && INDICES.contains(&key);
+            wide.then(|| (String::new(), n.to_string()))
+        }
+        Value::Array(list) => {
+            let mut at = list.iter().enumerate();
+            at.find_map(|(i, v)| Some((format!("[{i}]"), wide_index(v, key)?))).map(found)
+        }
+        Value::Object(map) => {
+            // Attributes and shapes name accessors by names of their own.
+            let named = key == "attributes" || key == "targets";
+            let of = |k| if named { "attributes" } else { k };
+            map.iter().find_map(|(k, v)| Some((format!(".{k}"), wide_index(v, of(k))?))).map(found)
+        }
+        _ => None,
+    }
 }
 
 /// Which entry of which list does not have the schema's shape.

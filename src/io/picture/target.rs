@@ -106,7 +106,7 @@ pub enum TargetError {
     #[error("\"-\": standard output has no ending; name its format: png, webp, exr, gif, apng or y4m")]
     Stdout,
     /// A name that is no text, or no name at all.
-    #[error("\"{name}\": expected a file name in UTF-8")]
+    #[error("\"{name}\": expected a file name, in UTF-8")]
     NoName {
         /// The name, as far as it can be shown.
         name: String,
