@@ -37,7 +37,8 @@ pub(super) struct Group {
 ///
 /// Triangles join the one with the most samples (the first of these) if they are of its draw and continue it: they share a
 /// vertex, where all that shading reads is the same, or they lie within a step of depth and their normals are alike. The
-/// colour is the leader's, at the point of it that is nearest to the centroid of all samples. Flat faces have a colour each
+/// colour is the leader's, at a point of it near the centroid of all samples: barycentric coordinates below 0 count as 0, which along
+/// the edge of a sliver may be some pixels away. Flat faces have a colour each
 /// and never join.
 #[inline(always)]
 pub(super) fn groups(
